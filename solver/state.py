@@ -10,7 +10,7 @@ import numpy as np
 
 from solver.gl.device import Device
 from solver.gl.field import Field
-from solver.gl.tiled import SavedTiles, TiledField
+from solver.gl.tiled import SavedTiles, Tile, TiledField
 
 
 @dataclass(frozen=True)
@@ -88,8 +88,8 @@ class State:
         return made
 
     @property
-    def textures(self) -> list[Field]:
-        """The textures that it holds, alone or, of tiled fields, together with other states."""
+    def textures(self) -> list[Field | Tile]:
+        """The textures that it holds, alone or, as tiles of tiled fields, together with other states."""
         return [*self.fields.values(), *(texture for saved in self.tiles.values() for texture in saved.textures)]
 
     def release(self) -> None:

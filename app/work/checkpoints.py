@@ -12,6 +12,7 @@ import numpy as np
 from app.model.recipe import Recipe
 from solver.gl.device import Device
 from solver.gl.field import Field
+from solver.gl.tiled import Tile
 from solver.state import State
 
 DEFAULT_BUDGET = 512 * 2**20
@@ -44,8 +45,8 @@ class Moment:
         return filled
 
     @cached_property
-    def textures(self) -> list[Field]:
-        """The textures that it holds, some of them together with other moments."""
+    def textures(self) -> list[Field | Tile]:
+        """The textures and tiles that it holds, some of them together with other moments."""
         return [texture for state in self.states.values() for texture in state.textures]
 
     def release(self) -> None:
@@ -74,9 +75,9 @@ class Checkpoints:
 
     def __init__(self, budget: int = DEFAULT_BUDGET) -> None:
         self.budget = budget
-        self.nbytes = 0  # of texture memory, what several share counted once
+        self.nbytes = 0  # of texture memory that they come to at most, what several share counted once
         self._kept: list[Checkpoint] = []
-        self._holders = Counter[Field]()
+        self._holders = Counter[Field | Tile]()
 
     def __len__(self) -> int:
         return len(self._kept)

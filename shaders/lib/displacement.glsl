@@ -24,11 +24,11 @@ vec4 to_edges_slope(float p, float cell, float count, float walled) {
 }
 
 // Between the four next texels. 4 reads.
-vec2 linear_displacement(sampler2D displacement, vec2 p) {
+vec4 linear_texels(sampler2D displacement, vec2 p) {
     vec2 texel = 1.0 / vec2(textureSize(displacement, 0)), cell = floor(p - 0.5), f = p - 0.5 - cell;
     vec2 low = (cell + 0.5) * texel, high = low + texel;
-    return mix(mix(texture(displacement, low).rg, texture(displacement, vec2(high.x, low.y)).rg, f.x),
-               mix(texture(displacement, vec2(low.x, high.y)).rg, texture(displacement, high).rg, f.x), f.y);
+    return mix(mix(texture(displacement, low), texture(displacement, vec2(high.x, low.y)), f.x),
+               mix(texture(displacement, vec2(low.x, high.y)), texture(displacement, high), f.x), f.y);
 }
 
 // Four-point cubic along x blended with one along y (the Boolean sum CL + LC - LL of the cubic C and the linear L), which
@@ -91,7 +91,7 @@ void to_edges(float p, float cell, float count, float walled, out float weights[
 }
 
 // Six-point quintic both ways: on an accumulated map of twice the grid as good as the cubic on one of four times. 36 reads.
-vec2 quintic_displacement(sampler2D displacement, vec2 p, float walled) {
+vec4 quintic_texels(sampler2D displacement, vec2 p, float walled) {
     vec2 size = vec2(textureSize(displacement, 0)), texel = 1.0 / size;
     vec2 cell = clamp(floor(p - 0.5), vec2(2.0), size - 4.0), f = p - 0.5 - cell;
     float wx[6], wy[6];
@@ -100,9 +100,12 @@ vec2 quintic_displacement(sampler2D displacement, vec2 p, float walled) {
     float ex[6], ey[6];
     to_edges(p.x, cell.x, size.x, walled, ex);
     to_edges(p.y, cell.y, size.y, walled, ey);
-    vec2 sum = vec2(0.0), corner = (cell - 1.5) * texel;
+    vec2 corner = (cell - 1.5) * texel;
+    vec4 sum = vec4(0.0);
     for (int j = 0; j < 6; ++j)
         for (int i = 0; i < 6; ++i)
-            sum += wx[i] * wy[j] * texture(displacement, corner + vec2(i, j) * texel).rg * vec2(ex[i], ey[j]);
+            sum += wx[i] * wy[j] * texture(displacement, corner + vec2(i, j) * texel) * vec4(ex[i], ey[j], 1.0, 1.0);
     return sum;
 }
+
+vec2 quintic_displacement(sampler2D displacement, vec2 p, float walled) { return quintic_texels(displacement, p, walled).rg; }

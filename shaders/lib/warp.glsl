@@ -167,14 +167,15 @@ bool is_held(vec2 place) {
 vec2 held_displacement(vec2 place) { return cubic_displacement(u_kept, on_texel(place), 0.0); }
 #endif
 
-// A, or a closed map, at a place in its texels: by the cubic with CUBIC, bilinearly with LINEAR, else by the quintic.
-vec2 accumulated_displacement(sampler2D accumulated, vec2 place) {
+// A, a closed map or what is undone, at a place in its texels: by the cubic with CUBIC, bilinearly with LINEAR, else by the
+// quintic.
+vec4 accumulated_texels(sampler2D accumulated, vec2 place) {
 #if defined(LINEAR)
-    return linear_displacement(accumulated, place);
+    return linear_texels(accumulated, place);
 #elif defined(CUBIC)
-    return cubic_displacement(accumulated, place, u_walled);
+    return cubic_texels(accumulated, place, u_walled);
 #else
-    return quintic_displacement(accumulated, place, u_walled);
+    return quintic_texels(accumulated, place, u_walled);
 #endif
 }
 
@@ -187,12 +188,13 @@ void follow(sampler2D closed, vec2 x, inout vec2 moved, inout vec2 more, inout v
     vec2 led = within_picture(x, moved + more) - moved;
     moved += led;
     place += led * vec2(textureSize(u_accumulated, 0)) / u_picture;
-    more = accumulated_displacement(closed, place * texels_of(closed));
+    more = accumulated_texels(closed, place * texels_of(closed)).rg;
 }
 
-// What the restore brush has undone at a place in A's texels: a way (E), and the part of what follows (T).
+// What the restore brush has undone at a place in A's texels: a way (E), and the part of what follows (T). E is read as A is,
+// so that beneath the brush they add up to what A was also between texels.
 vec3 undone_at(sampler2D undone, vec2 place) {
-    vec3 read = cubic_texels(undone, place * texels_of(undone), u_walled).rgb;
+    vec3 read = accumulated_texels(undone, place * texels_of(undone)).rgb;
     return vec3(read.rg, clamp(read.b, 0.0, 1.0));
 }
 
@@ -208,7 +210,7 @@ void undo(vec3 undone, vec2 moved, inout vec2 more, inout vec2 back, inout float
 
 // D(x) of x that the submaps have `moved`, to `place` in A's texels.
 vec2 displacement_from(vec2 x, vec2 moved, vec2 place) {
-    vec2 more = accumulated_displacement(u_accumulated, place), back = vec2(0.0);
+    vec2 more = accumulated_texels(u_accumulated, place).rg, back = vec2(0.0);
     float part = 1.0;
 #define UNDO(undone) undo(undone_at(undone, place), moved, more, back, part)
 #define FOLLOW(closed, number) if ((UNDONE >> number & 1) != 0) UNDO(closed); else follow(closed, x, moved, more, place);

@@ -94,11 +94,11 @@ class Field:
 
     def clear(self, *values: float) -> None:
         """Fill with `values`, by default zero."""
+        self.before_drawing()
         self.device.use()
         red, green, blue, alpha = (*values, 0.0, 0.0, 0.0, 0.0)[:4]
         self.framebuffer.clear(red, green, blue, alpha)
         self.device.fences.hold()
-        self.drawn()
 
     def set(self, array: np.ndarray, region: tuple[int, int, int, int] | None = None) -> None:
         """Write an array of shape (height, width) or (height, width, components), row 0 on top.
@@ -121,9 +121,9 @@ class Field:
             data = array.astype(DTYPES[self.dtype], copy=False)
         if self.dtype in ("f2", "f4") and not np.isfinite(data).all():
             raise FieldError(f"{self.label}: the array holds a value that is not finite")
+        self.before_drawing(region)
         self.device.use()
         self.texture.write(np.ascontiguousarray(data).tobytes(), viewport=region)
-        self.drawn(region)
 
     def get(self, region: tuple[int, int, int, int] | None = None) -> np.ndarray:
         """Read back as an array of shape (height, width) or (height, width, components), row 0 on top.
@@ -155,8 +155,8 @@ class Field:
         # would take it for his own.
         _ = self.device.ctx.error
 
-    def drawn(self, region: tuple[int, int, int, int] | None = None) -> None:
-        """Hear that something was drawn into it, or into (x, y, width, height) of it."""
+    def before_drawing(self, region: tuple[int, int, int, int] | None = None) -> None:
+        """Hear that something will be drawn into it, or into (x, y, width, height) of it."""
 
     def release(self) -> None:
         """Free the texture; the field can no longer be used."""

@@ -81,6 +81,11 @@ class Pass:
             inputs: the shader's uniforms without their `u_`.
         """
         fields = (target,) if isinstance(target, Field) else tuple(target)
+        regions = [(0, 0, *fields[0].size)] if region is None else _clipped(region, fields[0].size)
+        if not regions:
+            return
+        for field, part in product(fields, regions):
+            field.before_drawing(part)
         device = self.device
         device.use()
         self._bind(inputs)
@@ -88,9 +93,6 @@ class Pass:
             framebuffer = fields[0].framebuffer
         else:
             framebuffer = device.framebuffer(tuple([field.texture for field in fields]))
-        regions = [(0, 0, *fields[0].size)] if region is None else _clipped(region, fields[0].size)
-        if not regions:
-            return
         blend = "add" if add else blend
         if blend:
             self._begin_blending(blend)
@@ -102,8 +104,6 @@ class Pass:
             framebuffer.use()
             self._vertices.render(moderngl.TRIANGLES, count, first=first)
             device.timings.count(sum(width * height for _, _, width, height in parts), self.reads)
-            for field, part in product(fields, parts):
-                field.drawn(part)
         if blend:
             device.ctx.enable_only(moderngl.NOTHING)
         if triangles is None and region is not None:

@@ -1,8 +1,8 @@
-"""A large field of which a copy costs no more than what was drawn into it since the last one."""
+"""A large field of which a copy costs no more than what is drawn into it afterwards."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -44,17 +44,36 @@ class Kind(NamedTuple):
         ]
 
 
-@dataclass
-class _Tile:
-    """A copy of one tile, shared by all that hold it; `field` is None for a blank one."""
+class Tile:
+    """What one tile was at a moment, shared by all saves that hold it.
 
-    field: Field | None
-    holders: int = 0
+    It is copied only when the last field that is still the same there is about to be drawn into, and only if a save
+    holds it.
+
+    Args:
+        nbytes: of texture memory; 0 of a blank one.
+        field: a copy.
+    """
+
+    def __init__(self, nbytes: int = 0, field: Field | None = None) -> None:
+        self.nbytes = nbytes
+        self.field = field
+        self.holders = 0  # saves
+        self.living = set[TiledField]()  # fields that are the same there
+
+    @property
+    def is_blank(self) -> bool:
+        return self.nbytes == 0
+
+    def get(self, region: Region) -> np.ndarray:
+        """Its texels; `region`: where it is in the fields."""
+        return next(iter(self.living)).get(region) if self.field is None else self.field.get()
 
     def release(self) -> None:
         self.holders -= 1
         if self.holders == 0 and self.field is not None:
             self.field.release()
+            self.field = None
 
 
 @dataclass(frozen=True)
@@ -74,17 +93,17 @@ class SavedTiles:
     @classmethod
     def nothing(cls, kind: Kind, blank: float = 0.0) -> SavedTiles:
         """What a field of this kind holds before anything is drawn into it."""
-        return _held(cls(kind, np.full(kind.rows_and_columns, _Tile(None)), blank))
+        return _held(cls(kind, np.full(kind.rows_and_columns, Tile()), blank))
 
     @property
     def is_blank(self) -> bool:
         """True if nothing has been drawn into any tile."""
-        return all(tile.field is None for tile in self.tiles.flat)
+        return all(tile.is_blank for tile in self.tiles.flat)
 
     @property
-    def textures(self) -> list[Field]:
-        """The textures that it holds, alone or with others."""
-        return [tile.field for tile in self.tiles.flat if tile.field is not None]
+    def textures(self) -> list[Tile]:
+        """The tiles that it holds, alone or with others, but blank ones."""
+        return [tile for tile in self.tiles.flat if not tile.is_blank]
 
     def arrays(self) -> dict[str, np.ndarray]:
         """The tiles that are not blank, off the GPU: their `places` (n,), counted by rows, and all `texels` of them."""
@@ -92,9 +111,9 @@ class SavedTiles:
         dtype = np.dtype(DTYPES[self.kind.dtype])
         blank = round(self.blank * np.iinfo(dtype).max) if dtype.kind == "u" else self.blank
         bits = np.array([blank], dtype).view(f"u{dtype.itemsize}")
-        for place, tile in enumerate(self.tiles.flat):
-            if tile.field is not None:
-                values = tile.field.get().ravel()
+        for place, (tile, region) in enumerate(zip(self.tiles.flat, self.kind.regions, strict=True)):
+            if not tile.is_blank:
+                values = tile.get(region).ravel()
                 if (values.view(bits.dtype) != bits).any():
                     places.append(place)
                     texels.append(values)
@@ -116,9 +135,9 @@ class SavedTiles:
         ends = np.cumsum([np.prod(shape) for shape in shapes], dtype=int)
         if texels.shape != (ends[-1] if len(ends) else 0,):
             raise ValueError("tiles are of another size")
-        tiles = np.full(self.tiles.shape, _Tile(None))
+        tiles = np.full(self.tiles.shape, Tile())
         for place, shape, values in zip(places, shapes, np.split(texels, ends[:-1]), strict=False):
-            tiles.flat[place] = _Tile(device.upload(values.reshape(shape), "saved tile", kind.dtype))
+            tiles.flat[place] = Tile(values.nbytes, device.upload(values.reshape(shape), "saved tile", kind.dtype))
         return _held(SavedTiles(kind, tiles, self.blank))
 
     def held(self) -> SavedTiles:
@@ -134,7 +153,8 @@ class SavedTiles:
 class TiledField(Field):
     """A field of which saves share the tiles that were not drawn into in between.
 
-    Every pass that draws into it, `set`, `clear` and `copy_from` are noticed; who draws in another way calls `drawn`.
+    A save copies nothing: a tile is copied before it is drawn into. Every pass that draws into it, `set`, `clear` and
+    `copy_from` tell before they do; who draws in another way calls `before_drawing`.
 
     Args:
         blank: what all its components are at first, and where `clear` is not told another value.
@@ -156,7 +176,6 @@ class TiledField(Field):
         self.blank = blank
         # What each tile was last saved as or restored from; None where something was drawn since.
         self._same = np.full(self.kind.rows_and_columns, None, object)
-        self._ready = dict[int, _Tile]()  # by place, copies that were made for the next save, and are held until then
         self._pass = device.pass_
         super().__init__(device, size, components, label, dtype)
 
@@ -164,40 +183,27 @@ class TiledField(Field):
     def tiles(self) -> list[Region]:
         """Those that something was drawn into; the others are blank."""
         tiles = zip(self.kind.regions, self._same.flat, strict=True)
-        return [region for region, same in tiles if same is None or same.field is not None]
+        return [region for region, same in tiles if same is None or not same.is_blank]
 
-    def drawn(self, region: Region | None = None) -> None:
-        if region is None:
-            self._same[...] = None
-        else:
-            x, y, width, height = region
-            side = self.kind.tile
-            self._same[y // side : -(-(y + height) // side), x // side : -(-(x + width) // side)] = None
-        self._leave_ready(lambda place, tile: self._same.flat[place] is not tile)
+    def before_drawing(self, region: Region | None = None) -> None:
+        x, y, width, height = (0, 0, *self.size) if region is None else region
+        side, columns = self.kind.tile, self.kind.rows_and_columns[1]
+        for row in range(y // side, -(-(y + height) // side)):
+            for column in range(x // side, -(-(x + width) // side)):
+                if self._same[row, column] is not None:
+                    self._be(row * columns + column, None)
 
     def clear(self, *values: float) -> None:
         super().clear(*(values or self._blank_values))
         if not values:
-            self._same[...] = _Tile(None)
-            self._leave_ready()
-
-    def make_ready(self, tiles: Iterable[Region]) -> None:
-        """Copy whole tiles now, so that the next save has less to do."""
-        columns = self.kind.rows_and_columns[1]
-        for region in tiles:
-            place = region[1] // self.tile * columns + region[0] // self.tile
-            if self._same.flat[place] is None:
-                self._same.flat[place] = self._ready[place] = _Tile(self._copy_of(region), 1)
+            self._same[...] = Tile()
 
     def save(self) -> SavedTiles:
-        """A copy of this moment, sharing with earlier ones what is the same."""
-        for place, region in enumerate(self.kind.regions):
-            same: _Tile | None = self._same.flat[place]
-            if same is None or (same.field is not None and same.holders == 0):
-                self._same.flat[place] = _Tile(self._copy_of(region))
-        saved = _held(SavedTiles(self.kind, self._same.copy(), self.blank))
-        self._leave_ready()
-        return saved
+        """This moment, sharing with earlier ones what is the same."""
+        for place, (_, _, width, height) in enumerate(self.kind.regions):
+            if self._same.flat[place] is None:
+                self._be(place, Tile(width * height * self.components * np.dtype(DTYPES[self.dtype]).itemsize))
+        return _held(SavedTiles(self.kind, self._same.copy(), self.blank))
 
     def restore(self, saved: SavedTiles) -> list[Region]:
         """Go back to what was saved, exactly; the regions that were another.
@@ -210,22 +216,25 @@ class TiledField(Field):
         changed = list[Region]()
         for place, region in enumerate(self.kind.regions):
             tile, same = saved.tiles.flat[place], self._same.flat[place]
-            if tile is same or (same is not None and tile.field is None and same.field is None):
+            if tile is same or (same is not None and tile.is_blank and same.is_blank):
                 continue
-            if tile.field is None:
+            if tile.is_blank:
+                self.before_drawing(region)
                 self.device.use()
                 self.framebuffer.clear(*self._blank_values, viewport=region)
                 self.device.fences.hold()
+            elif tile.field is None:
+                self._copy(next(iter(tile.living)), region, (0, 0))
             else:
                 self._copy(tile.field, region, (-region[0], -region[1]))
-            self._same.flat[place] = tile
+            self._be(place, tile)
             changed.append(region)
-        self._leave_ready()
         return changed
 
     def release(self) -> None:
+        if not self._is_released:
+            self.before_drawing()
         super().release()
-        self._leave_ready()
 
     def copy_from(self, other: Field, region: Region | None = None) -> None:
         """Take over the texels of `other`, of the same size and components, or those in (x, y, width, height)."""
@@ -233,21 +242,28 @@ class TiledField(Field):
 
     def take(self, other: TiledField, tiles: Iterable[Region]) -> None:
         """Take over whole tiles of a field of the same kind, and share what they were saved as."""
+        columns = self.kind.rows_and_columns[1]
         for region in tiles:
             self._copy(other, region, (0, 0))
-            place = region[1] // self.tile, region[0] // self.tile
-            self._same[place] = other._same[place]
+            place = region[1] // self.tile * columns + region[0] // self.tile
+            self._be(place, other._same.flat[place])
+
+    def _be(self, place: int, tile: Tile | None) -> None:
+        """Be the same as a tile at a place, or None, as nothing; what was there is copied if it would be lost."""
+        before: Tile | None = self._same.flat[place]
+        if before is not None and self in before.living:
+            if before.holders and before.field is None and len(before.living) == 1:
+                before.field = self._copy_of(self.kind.regions[place])
+            before.living.remove(self)
+        self._same.flat[place] = tile
+        if tile is not None and not tile.is_blank:
+            tile.living.add(self)
 
     def _copy_of(self, region: Region) -> Field:
         x, y, *size = region
-        copy = Field(self.device, (size[0], size[1]), self.components, f"{self.label}, saved tile", self.dtype)
+        copy = Field(self.device, (size[0], size[1]), self.components, f"{self.label}, saved tile", self.dtype, False)
         self._pass("gl/copy.frag")(copy, field=self, offset=(x, y))
         return copy
-
-    def _leave_ready(self, which: Callable[[int, _Tile], bool] = lambda place, tile: True) -> None:
-        """Release the copies that are held for the next save: all, or those for which `which` is true."""
-        for place in [place for place, tile in self._ready.items() if which(place, tile)]:
-            self._ready.pop(place).release()
 
     @property
     def _blank_values(self) -> tuple[float, float, float, float]:

@@ -98,7 +98,6 @@ class AccumulatedMap:
         self._moved: list[Region] = []  # tiles to be drawn anew
         self._copied: list[Region] = []  # tiles to be copied
         self._done = 0  # of both
-        self._is_saved = False  # if so, tiles are copied for the next save as they are drawn, not all of them at once
         self.limits = self._picture = (0.0, 0.0, *extent)
         self.is_walled = True
         self.finest = 1.0
@@ -176,8 +175,6 @@ class AccumulatedMap:
         for now, after, undone in self._pairs:
             if anew:
                 draw(after, anew, **undone)
-                if self._is_saved:
-                    after.make_ready(anew)
             after.take(now, self._copied[max(before - count, 0) : max(until - count, 0)])
         if anew:
             self._look(anew)
@@ -222,14 +219,10 @@ class AccumulatedMap:
                 resample = self.device.pass_("warp/resample.frag", CUBIC=1)
                 regions = [_resampled(tile, self.size, size) for tile in now.tiles]
                 resample(closed, region=regions, displacement=now, origin=(0.0, 0.0), step=closed.texel)
+            self.now.clear()
         self._drop_undone()
-        self._begin_anew()
-
-    def _begin_anew(self) -> None:
         self.finest = 1.0
-        for field in (self.now, self._next):
-            field.clear()
-        self._stale.clear()
+        self._stale = set(self._next.tiles)  # cleared with the next remap, a few in each step
 
     def forget(self) -> None:
         """Drop what is planned."""
@@ -267,8 +260,7 @@ class AccumulatedMap:
         self.finest = 0.0
 
     def saved(self) -> dict[str, TiledField]:
-        """The fields by name, to be saved; from the first call on, tiles are made ready for that as they are drawn."""
-        self._is_saved = True
+        """The fields by name, to be saved."""
         names = [f"{UNDONE if _is_undone(field) else CLOSED}{number}" for number, field in enumerate(self._chain)]
         return {ACCUMULATED: self.now} | dict(zip(names, self._chain, strict=True))
 
@@ -301,7 +293,10 @@ class AccumulatedMap:
         """The identity; what was planned is forgotten."""
         self.forget()
         self._open()
-        self._begin_anew()
+        for field in (self.now, self._next):
+            field.clear()
+        self._stale.clear()
+        self.finest = 1.0
         self.limits, self.is_walled = self._picture, True
 
     def release(self) -> None:

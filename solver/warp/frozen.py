@@ -134,8 +134,8 @@ class Frozen:
             self.box = None
             held = tiles["held"]
             for region, tile in zip(held.kind.regions, held.tiles.flat, strict=True):
-                if tile.field is not None:
-                    self._reach(tile.field.get(), *region[:2])
+                if not tile.is_blank:
+                    self._reach(tile.get(region), *region[:2])
 
     def release(self) -> None:
         """Hold nothing any more."""

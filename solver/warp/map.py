@@ -223,10 +223,15 @@ class WarpMap:
             amount: 0-1, the part of the displacement that is taken away at the centre.
 
         Raises:
-            ValueError: if a number is not finite or too large.
+            ValueError: if a number is not finite, too large, or outside these limits.
         """
         numbers("a brush's centre", center, 2)
         numbers("a brush", (radius, hardness, amount), 3)
+        if radius <= 0:
+            raise ValueError(f"a brush of radius {radius:g} was given; it must be above 0")
+        for what, part in (("hardness", hardness), ("amount", amount)):
+            if not 0 <= part <= 1:
+                raise ValueError(f"a brush of {what} {part:g} was to restore; it must be from 0 to 1")
         if not self._is_settled:
             self._begin_remap()  # or there would be a step around the held places
         self._remapping.finish()

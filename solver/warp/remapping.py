@@ -199,8 +199,8 @@ class Remapping:
             # Also where it is held: places next to that may look into it, and it goes on from there once released.
             for is_near, parts in self._frozen.parts(regions, (0.0, 0.0), target.texel):
                 defines = defines_of(levels if is_near else away_from_held(levels))
-                carry = {"CARRY": 1} if undone else fine
-                compose = self.device.pass_("warp/compose.frag", REMAP=1, **carry, **defines)
+                carry = {"CARRY": 1} if undone else {}
+                compose = self.device.pass_("warp/compose.frag", REMAP=1, **fine, **carry, **defines)
                 compose(target, region=parts, **inputs, **undone)
 
         self._accumulated.draw(part, draw)

@@ -9,7 +9,7 @@ import numpy as np
 from solver.gl.field import Field, FieldPool
 from solver.gl.passes import Region
 from solver.gl.points import draw_at
-from solver.limits import places
+from solver.limits import check_type, places
 from solver.warp.map import WarpMap
 
 
@@ -18,7 +18,7 @@ class ScaledMap:
 
     Args:
         warp: the map; what it looks like follows it.
-        amount: a, 0 to 2; may be set.
+        amount: a, 0 to 2; may be set, a `ValueError` otherwise.
 
     Attributes:
         extent, size, coarse_size, device: the map's.
@@ -30,6 +30,17 @@ class ScaledMap:
         self.device, self.extent, self.size = warp.device, warp.extent, warp.size
         self._fields = FieldPool(warp.device, "scaled map")
         self._drawn: object = None
+
+    @property
+    def amount(self) -> float:
+        return self._amount
+
+    @amount.setter
+    def amount(self, amount: float) -> None:
+        check_type("the amount of a map", amount)
+        if not 0 <= amount <= 2:
+            raise ValueError(f"an amount of {amount:g} of a map was asked for; it must be from 0 to 2")
+        self._amount = amount
 
     @property
     def version(self) -> tuple[int, float]:

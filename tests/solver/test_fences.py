@@ -47,7 +47,7 @@ def late_threads(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "copy(target, field=source, offset=(0, 0), region=[(0, 0, 3, 3), (9, 9, 3, 3)])",
         "copy.draw_into(target.framebuffer, field=source, offset=(0, 0))",
         "target.clear(1.0)",
-        "target.drawn((0, 0, 1, 1)); target.restore(blank)",
+        "target.before_drawing((0, 0, 1, 1)); target.restore(blank)",
     ],
 )
 def test_a_fence_outlives_its_signal(late_threads: Path, what: str):

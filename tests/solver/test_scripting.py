@@ -34,6 +34,7 @@ from solver.gl.field import Field, FieldError
 from solver.resample.plan import Sampling
 from solver.resample.sampler import Sampler
 from solver.warp.inverse import ForwardMap
+from solver.warp.scaled import ScaledMap
 from support import reference
 
 SECTION = (Path(__file__).parents[2] / "README.md").read_text("utf-8").split("## Scripting")[1].split("\n## ")[0]
@@ -271,6 +272,12 @@ def test_a_velocity_as_large_as_may_be_set_goes_on(device: Device) -> None:
         lambda warp: warp.restore_under((0.3, 0.3), 0.1, amount=np.nan),
         lambda warp: warp.restore_under((0.3, 0.3), 0.1, hardness=np.nan),
         lambda warp: warp.restore_under((0.3, 0.3), np.inf),
+        lambda warp: warp.restore_under((0.3, 0.3), 0.1, amount=-1.0),
+        lambda warp: warp.restore_under((0.3, 0.3), 0.1, amount=1.5),
+        lambda warp: warp.restore_under((0.3, 0.3), 0.1, hardness=-0.1),
+        lambda warp: warp.restore_under((0.3, 0.3), 0.0),
+        lambda warp: ScaledMap(warp, -1.0),
+        lambda warp: ScaledMap(warp, np.nan),
         lambda warp: warp.determinants(np.zeros((3, 3))),
         lambda warp: ForwardMap(warp).at(np.zeros((3, 3))),
         lambda warp: warp.read((40.5, 24)),
@@ -293,6 +300,12 @@ def test_a_velocity_as_large_as_may_be_set_goes_on(device: Device) -> None:
         "amount of NaN",
         "hardness of NaN",
         "endless radius",
+        "negative amount",
+        "more than all",
+        "negative hardness",
+        "no radius",
+        "negative part",
+        "part of NaN",
         "places of determinants",
         "places of the forward map",
         "half a pixel",
@@ -304,7 +317,7 @@ def test_a_velocity_as_large_as_may_be_set_goes_on(device: Device) -> None:
 )
 def test_a_map_refuses_what_does_not_fit(device: Device, act: Callable[[WarpMap], object]) -> None:
     warp = WarpMap(device, Grid(20, 12))
-    with pytest.raises(ValueError, match=r"shape|transposed|step|wanted|components|cannot follow|beyond"):
+    with pytest.raises(ValueError, match=r"shape|transposed|step|wanted|components|cannot follow|beyond|must be"):
         act(warp)
     assert not warp.read().any()
     warp.release()

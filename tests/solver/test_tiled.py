@@ -92,39 +92,39 @@ def test_what_no_save_holds_any_more_is_copied_anew(device: Device, tiled: Tiled
     again.release()
 
 
-def test_tiles_that_were_made_ready_are_what_a_save_holds(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
-    """It copies none of them again, but what has been drawn into since; and what it does not take is let go."""
+def test_a_tile_is_copied_before_it_is_drawn_into_and_only_if_a_save_holds_it(
+    device: Device, monkeypatch: pytest.MonkeyPatch
+) -> None:
     made = Made(monkeypatch)
-    tiled = TiledField(device, SIZE, 2, "tiled", tile=SIDE)
-    blank = tiled.save()
+    tiled, other = (TiledField(device, SIZE, 2, "tiled", tile=SIDE) for _ in range(2))
 
     def copies(act: Callable[[], object]) -> int:
-        device.timings.take()
-        with device.stage("copies"):
-            act()
-        return device.timings.passes["copies"]
+        before = len(made.left)
+        act()
+        return (len(made.left) - before) // 2  # textures, with their framebuffers
 
     tiled.set(noise(1))
-    assert copies(lambda: tiled.make_ready(tiled.kind.regions)) == 12
-    assert copies(lambda: tiled.make_ready(tiled.kind.regions)) == 0
-    draw(device, tiled, 2, (30, 10, 4, 5))  # across two tiles
-    now, saves = tiled.get(), list[SavedTiles]()
-    assert copies(lambda: saves.append(tiled.save())) == 2
-    assert nbytes(saves[0]) == WHOLE
-    tiled.clear()
-    tiled.restore(saves[0])
-    assert (tiled.get() == now).all()
+    saves = list[SavedTiles]()
+    assert copies(lambda: saves.append(tiled.save())) == 0
+    source = device.upload(noise(2))
+    assert copies(lambda: tiled.copy_from(source, (30, 10, 4, 5))) == 2, "it lies across two tiles"
+    assert copies(lambda: tiled.copy_from(source, (31, 10, 2, 2))) == 0, "no save holds what is there now"
+    now = tiled.get()
+    saves.append(tiled.save())
+    assert copies(lambda: other.take(tiled, tiled.kind.regions)) == 0
+    assert copies(tiled.clear) == 0, "another field has it still"
+    assert copies(lambda: other.set(noise(3))) == 12
+    for saved, values in ((saves[0], noise(1)), (saves[1], now), (saves[0], noise(1))):
+        tiled.restore(saved)
+        assert tiled.get().tobytes() == values.tobytes()
     saves.pop().release()
-    assert copies(lambda: saves.append(tiled.save())) == 12, "nothing is held for a save any more"
-    restores = [lambda: tiled.restore(blank), lambda: tiled.restore(saves[0])]
-    for change in (*restores, tiled.clear, lambda: tiled.set(noise(4)), tiled.release):
-        tiled.set(noise(3))
-        before = len(made.left)
-        tiled.make_ready(tiled.kind.regions[3:])
-        change()
-        assert len(made.left) <= before
-    blank.release()
-    saves[0].release()
+    tiled.restore(saves[0])
+    tiled.release()
+    other.restore(saves[0])
+    assert other.get().tobytes() == noise(1).tobytes()
+    saves.pop().release()
+    for field in (other, source):
+        field.release()
     assert not made.left
 
 
