@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import product
 from typing import Literal
 
 import moderngl
@@ -81,32 +80,36 @@ class Pass:
             inputs: the shader's uniforms without their `u_`.
         """
         fields = (target,) if isinstance(target, Field) else tuple(target)
-        device = self.device
+        device, size = self.device, fields[0].size
         device.use()
         self._bind(inputs)
         if len(fields) == 1:
             framebuffer = fields[0].framebuffer
         else:
             framebuffer = device.framebuffer(tuple([field.texture for field in fields]))
-        regions = [(0, 0, *fields[0].size)] if region is None else _clipped(region, fields[0].size)
+        regions = [(0, 0, *size)] if region is None else _clipped(region, size)
         if not regions:
             return
         blend = "add" if add else blend
         if blend:
             self._begin_blending(blend)
         # What has vertices of its own is drawn at once, wherever it lies.
-        for parts in [[part] for part in regions] if triangles is None else [regions]:
-            if triangles is None and region is not None:
-                framebuffer.scissor = parts[0]
-            first, count = triangles or (0, 3)
+        cuts = triangles is None and region is not None
+        first, count = triangles or (0, 3)
+        for part in regions if cuts else regions[:1]:
+            if cuts:
+                framebuffer.scissor = part
             framebuffer.use()
             self._vertices.render(moderngl.TRIANGLES, count, first=first)
-            device.timings.count(sum(width * height for _, _, width, height in parts), self.reads)
-            for field, part in product(fields, parts):
+        pixels = 0
+        for part in regions:
+            pixels += part[2] * part[3]
+            for field in fields:
                 field.drawn(part)
+        device.timings.count(pixels, self.reads, len(regions) if cuts else 1)
         if blend:
             device.ctx.enable_only(moderngl.NOTHING)
-        if triangles is None and region is not None:
+        if cuts:
             framebuffer.scissor = None  # pyright: ignore[reportAttributeAccessIssue]
         device.fences.hold()
 

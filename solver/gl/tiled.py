@@ -240,7 +240,7 @@ class TiledField(Field):
 
     def _copy_of(self, region: Region) -> Field:
         x, y, *size = region
-        copy = Field(self.device, (size[0], size[1]), self.components, f"{self.label}, saved tile", self.dtype)
+        copy = Field(self.device, (size[0], size[1]), self.components, f"{self.label}, saved tile", self.dtype, False)
         self._pass("gl/copy.frag")(copy, field=self, offset=(x, y))
         return copy
 
