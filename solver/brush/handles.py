@@ -197,32 +197,30 @@ class Handles:
             self._lead = None
             return
         radii, counts = self._radii[listed], self._counts[in_force]
+        strain = self._strain.look(self._places[listed], radii)  # drawn while the pushes are found
         ways = self._ways(active, listed, time, dt)
         rows, places = ways.rows, ways.here
-        slower = _of_each(np.minimum, self.slower(listed), rows)  # what is led as a whole goes as its slowest does
-        slower = np.repeat(slower * self._progressing(active, ways, dt), counts)
-        wanted, growths = self._wanted(active, slower, ways, dt)
         rings, loops, is_pushed = list[Ring](), list[slice](), np.ones(len(listed), bool)
-        for number, each, growth in zip(active, rows, growths, strict=True):
+        swelling_tips = list[tuple[int, Tip, float]]()
+        for which, (number, each) in enumerate(zip(active, rows, strict=True)):
             shape, local = self._shapes[number], self._shapes[number].handle.local
             if shape.is_ring:
                 around = slice(each.start + 1, each.stop)
                 tip = _tip(places[each.start], shape.handle.radius)
                 rings.append(Ring(each.start, around, places[around] - places[each.start], tip))
                 is_pushed[around] = False
-                self._brush.expand(self._fluid, tip, growth)
+                swelling_tips.append((which, tip, 0.0))
             elif shape.around is not None:
                 loops.append(each)
                 middle = places[each].mean(axis=0)
                 tip = _tip(middle, max(float(np.hypot(*(places[each] - middle).T).max()) / CORE, SMALLEST))
-                self._brush.expand(self._fluid, tip, (1 - local) * growth)
+                swelling_tips.append((which, tip, local))
         pushed = np.flatnonzero(is_pushed)
         share = self._local[listed][pushed]
         side = min(self._fluid.grid.picture)
         wide = np.maximum(np.minimum(WIDE * radii, side), radii)
         numbers = np.repeat(np.arange(len(rows)), counts)
         is_led, is_away = ways.is_led[numbers], self._are_away(ways)[numbers]
-        self._calm(places[pushed], np.where(is_led & is_away, wide, radii)[pushed], 1 - slower[pushed])
         beside = _beside(places, radii, numbers, is_led)[pushed]
         many = np.flatnonzero(beside)
         drawn, shares = np.concatenate([pushed, pushed[many]]), np.ones(len(pushed))
@@ -230,6 +228,12 @@ class Handles:
         shares = np.repeat(np.concatenate([shares, WIDE_SHARE * beside[many]]), 2)
         pushes = Pushes(self._fluid.grid, places[drawn], reaches)
         push, carried = pushes.influence(places), np.zeros((len(pushed), 2))
+        slower = _of_each(np.minimum, self._slower(strain(), listed), rows)  # a whole goes as slowly as its slowest
+        slower = np.repeat(slower * self._progressing(active, ways, dt), counts)
+        wanted, growths = self._wanted(active, slower, ways, dt)
+        for which, tip, local in swelling_tips:
+            self._brush.expand(self._fluid, tip, (1 - local) * growths[which])
+        self._calm(places[pushed], np.where(is_led & is_away, wide, radii)[pushed], 1 - slower[pushed])
         # What halts lets go: at rest among others that flow by it would strain the map around it as if it were led.
         firm = np.where(is_led, np.maximum(slower, LEAST_STIFFNESS), 1.0)
         softs = self._soft[listed] + (1 / firm - 1) / self._stiffness[listed]
@@ -307,7 +311,9 @@ class Handles:
         odds" where others are held, "soft" where it leads with less than all its stiffness, else "alone".
         """
         found = list[str | None]()
-        slower = self._slower(np.concatenate([np.zeros((0, 2)), *self.shapes]), np.arange(len(self._places)))
+        if not self._shapes:
+            return found
+        slower = self._slower(self._strain.around(self._located_or_waiting(), self._radii), np.arange(len(self._at)))
         for shape, rows, (_, waited) in zip(self._shapes, self._rows, self._lacks, strict=True):
             starts = self._starts[rows]
             if np.isnan(starts).any():
@@ -458,12 +464,10 @@ class Handles:
 
     def slower(self, numbers: np.ndarray) -> np.ndarray:
         """The part of its speed, 0-1, that the map around each of these points still allows."""
-        return self._slower(self._places[numbers], numbers)
+        return self._slower(self._strain.around(self._places[numbers], self._radii[numbers]), numbers)
 
-    def _slower(self, places: np.ndarray, numbers: np.ndarray) -> np.ndarray:
-        if not len(numbers):
-            return np.zeros(0)
-        least, most, area_left = self._strain.around(places, self._radii[numbers]).T
+    def _slower(self, strain: np.ndarray, numbers: np.ndarray) -> np.ndarray:
+        least, most, area_left = strain.T
         grown, local = self._grown(), self._locality(numbers)
         least = np.minimum(least, area_left) * grown
         slowing = SLOWING + local * (SLOWING_LOCAL - SLOWING)
