@@ -141,7 +141,7 @@ class Context:
         raise ContextError(f"no OpenGL 3.3 without a window{where} ({', '.join(dict.fromkeys(reasons))}){hint}")
 
     def framebuffer(self, textures: tuple[moderngl.Texture, ...]) -> moderngl.Framebuffer:
-        """The framebuffer that draws into a texture, or into several at once, kept until one of them is released."""
+        """The framebuffer that draws into several textures at once, kept until one of them is released."""
         target = self._targets.get(textures)
         if target is None:
             target = self._targets[textures] = self.ctx.framebuffer(textures)
@@ -151,12 +151,10 @@ class Context:
 
     def forget_targets(self, texture: moderngl.Texture) -> None:
         """Drop the framebuffers that hold a texture, because it is being released."""
+        # moderngl binds the last framebuffer again after making a new one: an error in GL if that one is gone.
         self.use()
-        targets = self._targets_of.pop(texture, ())
-        if targets:
-            # moderngl binds the last framebuffer again after making a new one: an error in GL if that one is gone.
-            self._rest.use()
-        for textures in targets:
+        self._rest.use()
+        for textures in self._targets_of.pop(texture, ()):
             self._targets.pop(textures).release()
             for other in set(textures) - {texture}:
                 self._targets_of[other].remove(textures)

@@ -74,7 +74,8 @@ class Field:
         if self._is_released:
             raise FieldError(f"{self.label} was released")
         self.device.use()
-        self.framebuffer = framebuffer = self.device.framebuffer((self.texture,))
+        # Not one of `device.framebuffer`, which would keep the texture of a field that is dropped and not released.
+        self.framebuffer = framebuffer = self.device.ctx.framebuffer([self.texture])
         framebuffer.label = self.label
         return framebuffer
 
@@ -167,7 +168,8 @@ class Field:
         if not self._is_released:
             self._is_released = True
             self.device.forget_targets(self.texture)
-            vars(self).pop("framebuffer", None)
+            if framebuffer := vars(self).pop("framebuffer", None):
+                framebuffer.release()
             self.texture.release()
             del self.texture
 
