@@ -35,7 +35,7 @@ class State:
             if isinstance(live, TiledField):
                 tiles[name] = live.save()
             else:
-                copies[name] = device.field(live.size, live.components, f"{live.label}, saved", live.dtype)
+                copies[name] = Field(device, live.size, live.components, f"{live.label}, saved", live.dtype, False)
                 copies[name].copy_from(live)
         given = {name: np.array(value) for name, value in values.items() if value is not None}
         return cls(copies, given, tiles)

@@ -6,7 +6,7 @@ One long class: each widget is a method of what it draws with, and there is noth
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, field
 from math import isfinite, log
 from typing import Any
@@ -29,6 +29,12 @@ PANEL = int(
     # One that comes up while a slider is dragged would end the drag.
     | imgui.WindowFlags_.no_focus_on_appearing
 )
+# Put together once: each costs as much as drawing a widget.
+ON_GROUND = PANEL | int(imgui.WindowFlags_.no_background)
+FLOATING = PANEL | int(imgui.WindowFlags_.always_auto_resize)
+ANYWHERE = int(imgui.PopupFlags_.any_popup_id | imgui.PopupFlags_.any_popup_level)
+DISABLED_TOO = int(imgui.HoveredFlags_.allow_when_disabled)
+RESTS = int(imgui.HoveredFlags_.for_tooltip) | DISABLED_TOO
 
 
 @dataclass
@@ -83,7 +89,7 @@ class Ui:
         imgui.set_next_window_size(ImVec2(rect.width, rect.height))
         imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(self.px(padding[0]), self.px(padding[1])))
         imgui.push_style_var(imgui.StyleVar_.window_rounding, 0.0)
-        imgui.begin(name, None, PANEL | imgui.WindowFlags_.no_background | flags)
+        imgui.begin(name, None, ON_GROUND | flags)
         imgui.pop_style_var(2)
         try:
             yield
@@ -99,8 +105,7 @@ class Ui:
         imgui.set_next_window_bg_alpha(alpha)
         imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(self.px(6), self.px(4)))
         imgui.push_style_var(imgui.StyleVar_.window_rounding, self.px(8))
-        through = 0 if clicked else imgui.WindowFlags_.no_inputs
-        imgui.begin(name, None, PANEL | imgui.WindowFlags_.always_auto_resize | through)
+        imgui.begin(name, None, FLOATING | (0 if clicked else int(imgui.WindowFlags_.no_inputs)))
         imgui.pop_style_var(2)
         try:
             yield
@@ -117,22 +122,15 @@ class Ui:
     def end_frame(self) -> None:
         """Everything has been drawn: what covers the canvas is known."""
         self.covers, self.covering = self.covering, []
-        anywhere = imgui.PopupFlags_.any_popup_id | imgui.PopupFlags_.any_popup_level
-        self.has_popup = imgui.is_popup_open("", anywhere)
+        self.has_popup = imgui.is_popup_open("", ANYWHERE)
 
     def is_covered(self, x: float, y: float) -> bool:
         """Something that can be clicked lies at a point of the screen, or might."""
         return self.has_popup or any(rect.contains(x, y) for rect in self.covers)
 
-    @contextmanager
-    def enabled(self, condition: bool) -> Iterator[None]:
-        if not condition:
-            imgui.begin_disabled()
-        try:
-            yield
-        finally:
-            if not condition:
-                imgui.end_disabled()
+    def enabled(self, condition: bool) -> AbstractContextManager[None]:
+        """What is drawn inside can be used only on a condition."""
+        return nullcontext() if condition else _disabled()
 
     # -- words ------------------------------------------------------------------------------------------------------
 
@@ -157,8 +155,8 @@ class Ui:
 
         `key`: the chord that does it by default. `above`: where it covers nothing below.
         """
-        rests = imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip | imgui.HoveredFlags_.allow_when_disabled)
-        if not (rests or (at_once and imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled))):
+        rests = imgui.is_item_hovered(RESTS)
+        if not (rests or (at_once and imgui.is_item_hovered(DISABLED_TOO))):
             return
         if at_once or above:
             self._place_beside(imgui.get_item_rect_min(), imgui.get_item_rect_max(), above)
@@ -460,6 +458,15 @@ class Ui:
         self.rule(corner + ImVec2(0, self.px(6)), corner + ImVec2(self.px(1), self.px(26)))
         imgui.dummy(ImVec2(self.px(1), self.px(32)))
         imgui.same_line(0, self.px(GRID))
+
+
+@contextmanager
+def _disabled() -> Iterator[None]:
+    imgui.begin_disabled()
+    try:
+        yield
+    finally:
+        imgui.end_disabled()
 
 
 def _fraction(value: float, low: float, high: float, logarithmic: bool) -> float:

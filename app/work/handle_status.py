@@ -58,25 +58,30 @@ class Held:
 def held_in(replay: Replay) -> list[Held]:
     """Those that are in force; reads back from the GPU."""
     tick, dt, extent = replay.tick, replay.recipe.fluid.dt, replay.grid.extent
-    found, led, handles = [], replay.led, replay.handles
+    led, handles = replay.led, replay.handles
     if not any(one.is_in_force(tick, dt) for _, one in led):
-        return found
+        return []
     shapes = handles.shapes
-    for (label, one), handle, shape, now, start, (due, left) in zip(
+    now, starts = handles.middles(shapes), handles.starts
+    starts = np.where(np.isnan(starts), now, starts)
+    targets = [
+        handle.wanted(start, max(replay.time, handle.ready), dt, np.inf) if handle.goal else start
+        for handle, start in zip(handles.handles, starts, strict=True)
+    ]
+    found = []
+    for (label, one), shape, (due, left), *places in zip(
         led,
-        handles.handles,
         shapes,
-        handles.middles(shapes),
-        handles.starts,
         handles.left(replay.time, dt),
+        _fractions(starts, extent),
+        _fractions(now, extent),
+        _fractions(np.array(targets), extent),
         strict=True,
     ):
         if one.is_in_force(tick, dt):
-            start = now if np.isnan(start[0]) else start
-            target = handle.wanted(start, max(replay.time, handle.ready), dt, np.inf) if handle.goal else start
+            start, here, target = places
             lines = [_fractions(each, extent, one.closed) if one.points else () for each in (shape, due)]
-            begun, here, goal = _fractions(np.array([start, now, target]), extent)
-            found.append(Held(one, label, begun, here, goal, left, *lines))
+            found.append(Held(one, label, start, here, target, left, *lines))
     return found
 
 

@@ -148,24 +148,29 @@ class Handle(Course):
 
         x0, y0 = start.tolist()
 
-        def within(place: Sequence[float]) -> np.ndarray:
+        def within(place: Sequence[float]) -> Point:
             x, y = place[0] - x0, place[1] - y0
             part = min(1.0, farthest * self.reach / max(math.hypot(x, y), 1e-30))
-            return np.array((part * x, part * y))
+            return part * x, part * y
 
         if not self.keys or time < self.ready:
-            return start if self.to is None else start + self.passed(time) * within(self.to)
-        here, there, part = _between([(self.ready, *((x0, y0) if self.to is None else self.to)), *self.keys], time, dt)
+            if self.to is None:
+                return start
+            part, (x, y) = self.passed(time), within(self.to)
+            return np.array((x0 + part * x, y0 + part * y))
+        here, there, part = _between((x0, y0) if self.to is None else self.to, self.ready, self.keys, time, dt)
+        x, y = within(here)
         if part == 0:
-            return start + within(here)
-        return start + (1 - part) * within(here) + part * within(there)
+            return np.array((x0 + x, y0 + y))
+        far_x, far_y = within(there)
+        return np.array((x0 + (1 - part) * x + part * far_x, y0 + (1 - part) * y + part * far_y))
 
     def turn(self, time: float, dt: float) -> tuple[float, float]:
         """The angle, radians, and the scale that it shall have at a time; as `wanted`."""
         rotate, scale = self.rotate or 0.0, self.scale or 1.0
         if not self.turned or time < self.upright:
             return math.radians(rotate) * self.passed(time), scale ** self.passed(time)
-        here, there, part = _between([(self.upright, rotate, scale), *self.turned], time, dt)
+        here, there, part = _between((rotate, scale), self.upright, self.turned, time, dt)
         angle = (1 - part) * here[0] + part * there[0]
         return math.radians(angle), here[1] ** (1 - part) * there[1] ** part
 
@@ -260,7 +265,7 @@ class Shape:
         """True if all but the first of its points are a ring."""
         return len(self.led) > 1 and not self.handle.points
 
-    @property
+    @cached_property
     def is_in_picture(self) -> bool:
         """True if some of it lies in the picture; of what is all outside nothing is led."""
         held = self.led if self.handle.points else np.array([self.handle.at])
@@ -364,14 +369,20 @@ def _crosses_itself(loop: np.ndarray) -> bool:
 
 
 def _between(
-    keys: Sequence[tuple[float, ...]], time: float, dt: float
-) -> tuple[Sequence[float], Sequence[float], float]:
-    """The last of some keys that has come, the next, and the part of the way between them; the time comes first."""
-    number = bisect_right(keys, time + SAME_TIME * dt, key=itemgetter(0)) - 1
-    (since, *here), (until, *there) = keys[number], keys[min(number + 1, len(keys) - 1)]
-    if until == since or abs(time - since) <= SAME_TIME * dt:  # nothing of what comes later is seen in it
+    first: Point, since: float, keys: Sequence[tuple[float, float, float]], time: float, dt: float
+) -> tuple[Point, Point, float]:
+    """The last of some keys (t, a, b) that has come, the next, and the part of the way between them, without the times;
+    `first` has come at `since`.
+    """
+    here, number = first, bisect_right(keys, time + SAME_TIME * dt, key=itemgetter(0))
+    if number:
+        since, *_ = keys[number - 1]
+        here = keys[number - 1][1:]
+    # At a key nothing of what comes later is seen.
+    if number == len(keys) or keys[number][0] == since or abs(time - since) <= SAME_TIME * dt:
         return here, here, 0.0
-    return here, there, (time - since) / (until - since)
+    until, *there = keys[number]
+    return here, (there[0], there[1]), (time - since) / (until - since)
 
 
 def _line(corners: Sequence[Point], closed: bool) -> np.ndarray:

@@ -72,13 +72,23 @@ class Ring(NamedTuple):
         return float(np.hypot(*self.arms.T).mean())
 
 
-class Way(NamedTuple):
-    """Where points of a handle shall be now and a step later, (k, 2); if that moves; what the farthest has to go."""
+class Ways(NamedTuple):
+    """What the points of active handles have before them in a step.
 
+    Attributes:
+        rows: of each handle, where its points are listed.
+        here: where they are, (n, 2).
+        now, then: where they shall be now and a step later, (n, 2).
+        left: what the farthest point of each handle has to go, (h,).
+        is_led: which handles shall not be where they began.
+    """
+
+    rows: list[slice]
+    here: np.ndarray
     now: np.ndarray
     then: np.ndarray
-    goes: bool
-    left: float
+    left: np.ndarray
+    is_led: np.ndarray
 
 
 class Lead(NamedTuple):
@@ -186,34 +196,31 @@ class Handles:
         if not active:
             self._lead = None
             return
-        rows = _runs(self._counts[in_force])  # of each in what is listed
-        places, radii = self._places[listed], self._radii[listed]
-        ways = [self._way(number, time, dt) for number in active]
-        slower = self.slower(listed) * np.repeat(self._progressing(active, ways, dt), self._counts[in_force])
-        for each in rows:
-            slower[each] = slower[each].min()  # what is led as a whole goes as slowly as the slowest of it
-        wanted, growths, led = self._wanted(active, rows, slower, ways, dt)
+        radii, counts = self._radii[listed], self._counts[in_force]
+        strain = self._strain.look(self._places[listed], radii)  # drawn while the pushes are found
+        ways = self._ways(active, listed, time, dt)
+        rows, places = ways.rows, ways.here
         rings, loops, is_pushed = list[Ring](), list[slice](), np.ones(len(listed), bool)
-        for number, each, growth in zip(active, rows, growths, strict=True):
+        swelling_tips = list[tuple[int, Tip, float]]()
+        for which, (number, each) in enumerate(zip(active, rows, strict=True)):
             shape, local = self._shapes[number], self._shapes[number].handle.local
             if shape.is_ring:
                 around = slice(each.start + 1, each.stop)
                 tip = _tip(places[each.start], shape.handle.radius)
                 rings.append(Ring(each.start, around, places[around] - places[each.start], tip))
                 is_pushed[around] = False
-                self._brush.expand(self._fluid, tip, growth)
+                swelling_tips.append((which, tip, 0.0))
             elif shape.around is not None:
                 loops.append(each)
                 middle = places[each].mean(axis=0)
                 tip = _tip(middle, max(float(np.hypot(*(places[each] - middle).T).max()) / CORE, SMALLEST))
-                self._brush.expand(self._fluid, tip, (1 - local) * growth)
+                swelling_tips.append((which, tip, local))
         pushed = np.flatnonzero(is_pushed)
         share = self._local[listed][pushed]
         side = min(self._fluid.grid.picture)
         wide = np.maximum(np.minimum(WIDE * radii, side), radii)
-        numbers = np.repeat(np.arange(len(rows)), self._counts[in_force])
-        is_led, is_away = np.array(led)[numbers], np.array([self._is_away(way) for way in ways])[numbers]
-        self._calm(places[pushed], np.where(is_led & is_away, wide, radii)[pushed], 1 - slower[pushed])
+        numbers = np.repeat(np.arange(len(rows)), counts)
+        is_led, is_away = ways.is_led[numbers], self._are_away(ways)[numbers]
         beside = _beside(places, radii, numbers, is_led)[pushed]
         many = np.flatnonzero(beside)
         drawn, shares = np.concatenate([pushed, pushed[many]]), np.ones(len(pushed))
@@ -221,6 +228,12 @@ class Handles:
         shares = np.repeat(np.concatenate([shares, WIDE_SHARE * beside[many]]), 2)
         pushes = Pushes(self._fluid.grid, places[drawn], reaches)
         push, carried = pushes.influence(places), np.zeros((len(pushed), 2))
+        slower = _of_each(np.minimum, self._slower(strain(), listed), rows)  # a whole goes as slowly as its slowest
+        slower = np.repeat(slower * self._progressing(active, ways, dt), counts)
+        wanted, growths = self._wanted(active, slower, ways, dt)
+        for which, tip, local in swelling_tips:
+            self._brush.expand(self._fluid, tip, (1 - local) * growths[which])
+        self._calm(places[pushed], np.where(is_led & is_away, wide, radii)[pushed], 1 - slower[pushed])
         # What halts lets go: at rest among others that flow by it would strain the map around it as if it were led.
         firm = np.where(is_led, np.maximum(slower, LEAST_STIFFNESS), 1.0)
         softs = self._soft[listed] + (1 / firm - 1) / self._stiffness[listed]
@@ -265,9 +278,7 @@ class Handles:
     @property
     def shapes(self) -> list[np.ndarray]:
         """Where the points of each are now, (k, 2) in longer sides, or will begin; looking changes nothing."""
-        found, waiting = self._located(), np.isnan(self._starts[:, 0])
-        if waiting.any():
-            found[waiting] = self._at[waiting] + self._forward.at(self._at[waiting])
+        found = self._located_or_waiting()
         return [found[rows] for rows in self._rows]
 
     @property
@@ -301,7 +312,9 @@ class Handles:
         odds" where others are held, "soft" where it leads with less than all its stiffness, else "alone".
         """
         found = list[str | None]()
-        slower = self._slower(np.concatenate([np.zeros((0, 2)), *self.shapes]), np.arange(len(self._places)))
+        if not self._shapes:
+            return found
+        slower = self._slower(self._strain.around(self._located_or_waiting(), self._radii), np.arange(len(self._at)))
         for shape, rows, (_, waited) in zip(self._shapes, self._rows, self._lacks, strict=True):
             starts = self._starts[rows]
             if np.isnan(starts).any():
@@ -318,12 +331,16 @@ class Handles:
         """Where the points of each shall be, (k, 2) in longer sides, and how far it is from there, as `away`; once it
         has gone its first way, and at a time after that.
         """
-        found = []
-        for shape, now, rows in zip(self._shapes, self.shapes, self._rows, strict=True):
-            starts = now if np.isnan(self._starts[rows]).any() else self._starts[rows]
-            due = shape.due(starts, time, dt)
-            found.append((due, shape.away(now, due)))
-        return found
+        if not self._shapes:
+            return []
+        here, rows = self._located_or_waiting(), self._rows
+        starts = np.where(np.isnan(self._starts), here, self._starts)
+        dues = [shape.due(starts[each], time, dt) for shape, each in zip(self._shapes, rows, strict=True)]
+        left = _farthest(here - np.concatenate(dues), rows).tolist()
+        return [
+            (due, shape.away(here[each], due) if shape.is_ring else far)
+            for shape, each, due, far in zip(self._shapes, rows, dues, left, strict=True)
+        ]
 
     # -- its state --------------------------------------------------------------------------------------------------
 
@@ -395,58 +412,63 @@ class Handles:
         places[begun] = best
         return places
 
-    def _way(self, number: int, time: float, dt: float) -> Way:
-        shape, rows = self._shapes[number], self._rows[number]
-        now, then = (shape.wanted(self._starts[rows], at, dt) for at in (time, time + dt))
-        left = float(np.hypot(*(then - self._places[rows]).T).max())
-        return Way(now, then, bool(np.abs(then - now).max() > FOUND * dt), left)
+    def _located_or_waiting(self) -> np.ndarray:
+        """Where the points of all handles are, or will begin, (n, 2)."""
+        found, waiting = self._located(), np.isnan(self._starts[:, 0])
+        if waiting.any():
+            found[waiting] = self._at[waiting] + self._forward.at(self._at[waiting])
+        return found
 
-    def _progressing(self, active: list[int], ways: list[Way], dt: float) -> np.ndarray:
+    def _ways(self, active: list[int], listed: np.ndarray, time: float, dt: float) -> Ways:
+        """Those of these handles, with the numbers of all their points."""
+        rows, starts, here = _runs(self._counts[active]), self._starts[listed], self._places[listed]
+        shapes = [self._shapes[number] for number in active]
+        now, then = (
+            np.concatenate([shape.wanted(starts[each], at, dt) for shape, each in zip(shapes, rows, strict=True)])
+            for at in (time, time + dt)
+        )
+        is_led = _of_each(np.maximum, np.abs(then - starts).max(axis=1), rows) > FOUND
+        return Ways(rows, here, now, then, _farthest(then - here, rows), is_led)
+
+    def _progressing(self, active: list[int], ways: Ways, dt: float) -> np.ndarray:
         """1 for each of these handles; 0 for what comes no nearer to its goal, as long as nobody's goal moves."""
-        lacks = np.array([way.left for way in ways])
-        if any(way.goes for way in ways):
+        lacks = ways.left
+        if np.abs(ways.then - ways.now).max() > FOUND * dt:
             self._lacks[active] = np.inf, 0.0
         least, waited = self._lacks[active].T
         nearer = lacks < least / 2
         least, waited = np.where(nearer, lacks, least), np.where(nearer, 0.0, waited + dt)
         self._lacks[active] = np.stack([least, waited], axis=-1)
-        return np.where((waited > PATIENCE) & [self._is_away(way) for way in ways], 0.0, 1.0)
+        return np.where((waited > PATIENCE) & self._are_away(ways), 0.0, 1.0)
 
-    def _is_away(self, way: Way) -> bool:
-        """True if the farthest of a handle's points has more than a texel to go."""
-        return way.left > 1 / max(self._warp.size)
+    def _are_away(self, ways: Ways) -> np.ndarray:
+        """True for handles of which the farthest point has more than a texel to go."""
+        return ways.left > 1 / max(self._warp.size)
 
-    def _wanted(
-        self, active: list[int], rows: list[slice], slower: np.ndarray, ways: list[Way], dt: float
-    ) -> tuple[np.ndarray, list[float], list[bool]]:
-        """How the points of these handles shall move in this step, longer sides / s, and areas within grow, 1 / s.
-
-        Then which of them shall not be where they began.
-        """
-        wanted, growths, led, back = np.zeros((len(slower), 2)), list[float](), list[bool](), -math.expm1(-RATE * dt)
-        for number, each, (now, then, *_) in zip(active, rows, ways, strict=True):
-            shape, here = self._shapes[number], self._places[self._rows[number]]
-            led.append(bool(np.abs(then - self._starts[self._rows[number]]).max() > FOUND))
-            step = slower[each, None] * (then - now + back * (now - here))
-            most, far = FARTHEST_STEP * shape.handle.reach, float(np.hypot(*step.T).max())
-            part = min(1.0, most / max(far, 1e-30))
-            # The times of a script and of a recipe differ in their last digits, which solving would make more of.
-            wanted[each] = (step * part / dt).astype(np.float32)
-            areas = [0.0] if shape.around is None else [area(places[shape.around :]) for places in (here, now, then)]
-            growth = 0.0
-            if min(areas) > 0 or max(areas) < 0:
-                growth = math.log(areas[2] / areas[1]) + back * math.log(areas[1] / areas[0])
+    def _wanted(self, active: list[int], slower: np.ndarray, ways: Ways, dt: float) -> tuple[np.ndarray, list[float]]:
+        """How the points of these handles shall move in this step, longer sides / s, and areas within grow, 1 / s."""
+        back, (rows, here, now, then, *_) = -math.expm1(-RATE * dt), ways
+        step = slower[:, None] * (then - now + back * (now - here))
+        most = FARTHEST_STEP * np.array([self._shapes[number].handle.reach for number in active])
+        parts = np.minimum(1.0, most / np.maximum(_farthest(step, rows), 1e-30))
+        # The times of a script and of a recipe differ in their last digits, which solving would make more of.
+        wanted = (step * np.repeat(parts, self._counts[active])[:, None] / dt).astype(np.float32).astype(np.float64)
+        growths = list[float]()
+        for number, each, part in zip(active, rows, parts.tolist(), strict=True):
+            around, growth = self._shapes[number].around, 0.0
+            if around is not None:
+                areas = [area(places[each][around:]) for places in (here, now, then)]
+                if min(areas) > 0 or max(areas) < 0:
+                    growth = math.log(areas[2] / areas[1]) + back * math.log(areas[1] / areas[0])
             growths.append(float(slower[each.start]) * part * growth / dt)
-        return wanted, growths, led
+        return wanted, growths
 
     def slower(self, numbers: np.ndarray) -> np.ndarray:
         """The part of its speed, 0-1, that the map around each of these points still allows."""
-        return self._slower(self._places[numbers], numbers)
+        return self._slower(self._strain.around(self._places[numbers], self._radii[numbers]), numbers)
 
-    def _slower(self, places: np.ndarray, numbers: np.ndarray) -> np.ndarray:
-        if not len(numbers):
-            return np.zeros(0)
-        least, most, area_left = self._strain.around(places, self._radii[numbers]).T
+    def _slower(self, strain: np.ndarray, numbers: np.ndarray) -> np.ndarray:
+        least, most, area_left = strain.T
         grown, local = self._grown(), self._locality(numbers)
         least = np.minimum(least, area_left) * grown
         slowing = SLOWING + local * (SLOWING_LOCAL - SLOWING)
@@ -587,6 +609,16 @@ def _tip(place: np.ndarray, radius: float) -> Tip:
 def _runs(counts: np.ndarray) -> list[slice]:
     """Where each lies in a list of so many of each."""
     return [slice(first, last) for first, last in pairwise([0, *np.cumsum(counts).tolist()])]
+
+
+def _of_each(extreme: np.ufunc, values: np.ndarray, rows: list[slice]) -> np.ndarray:
+    """The largest or least of the values (n,) in each of these rows, of which there is one at least."""
+    return extreme.reduceat(values, [each.start for each in rows])
+
+
+def _farthest(ways: np.ndarray, rows: list[slice]) -> np.ndarray:
+    """How long the longest of ways (n, 2) in each of these rows is."""
+    return _of_each(np.maximum, np.hypot(*ways.T), rows)
 
 
 def _smoothstep(part: np.ndarray) -> np.ndarray:

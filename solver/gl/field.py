@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sized
 from numbers import Integral
-from typing import NoReturn
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -23,7 +23,7 @@ class FieldError(ValueError):
 
 
 class Field:
-    """One texture with its framebuffer: nearest filtering, clamped to the edge.
+    """One texture, with a framebuffer once it is drawn into or read back: nearest filtering, clamped to the edge.
 
     Args:
         device: the device it lives in.
@@ -60,19 +60,24 @@ class Field:
         texture = new_texture(device.ctx, self.size, components, dtype)
         texture.repeat_x = texture.repeat_y = False
         texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        framebuffer = device.ctx.framebuffer([texture])
-        texture.label = framebuffer.label = label
+        texture.label = label
         # Plain attributes, until it is released: a pass asks for ten textures.
         self.texture: moderngl.Texture = texture
-        self.framebuffer: moderngl.Framebuffer = framebuffer
+        self.framebuffer: moderngl.Framebuffer  # see `__getattr__`
         self._is_released = False
         if cleared:
             self.clear()
 
-    def __getattr__(self, name: str) -> NoReturn:
-        if name in ("texture", "framebuffer"):
+    def __getattr__(self, name: str) -> Any:
+        if name not in ("texture", "framebuffer"):
+            raise AttributeError(f"{type(self).__name__} has no {name}")
+        if self._is_released:
             raise FieldError(f"{self.label} was released")
-        raise AttributeError(f"{type(self).__name__} has no {name}")
+        self.device.use()
+        # Not one of `device.framebuffer`, which would keep the texture of a field that is dropped and not released.
+        self.framebuffer = framebuffer = self.device.ctx.framebuffer([self.texture])
+        framebuffer.label = self.label
+        return framebuffer
 
     @property
     def width(self) -> int:
@@ -163,9 +168,10 @@ class Field:
         if not self._is_released:
             self._is_released = True
             self.device.forget_targets(self.texture)
-            self.framebuffer.release()
+            if framebuffer := vars(self).pop("framebuffer", None):
+                framebuffer.release()
             self.texture.release()
-            del self.texture, self.framebuffer
+            del self.texture
 
     def __repr__(self) -> str:
         return f"Field({self.label}, {self.width} x {self.height} x {self.components} {self.dtype})"

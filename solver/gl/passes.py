@@ -81,12 +81,12 @@ class Pass:
             inputs: the shader's uniforms without their `u_`.
         """
         fields = (target,) if isinstance(target, Field) else tuple(target)
-        regions = [(0, 0, *fields[0].size)] if region is None else _clipped(region, fields[0].size)
+        device, size = self.device, fields[0].size
+        regions = [(0, 0, *size)] if region is None else _clipped(region, size)
         if not regions:
             return
         for field, part in product(fields, regions):
             field.before_drawing(part)
-        device = self.device
         device.use()
         self._bind(inputs)
         if len(fields) == 1:
@@ -97,16 +97,18 @@ class Pass:
         if blend:
             self._begin_blending(blend)
         # What has vertices of its own is drawn at once, wherever it lies.
-        for parts in [[part] for part in regions] if triangles is None else [regions]:
-            if triangles is None and region is not None:
-                framebuffer.scissor = parts[0]
-            first, count = triangles or (0, 3)
+        cuts = triangles is None and region is not None
+        first, count = triangles or (0, 3)
+        for part in regions if cuts else regions[:1]:
+            if cuts:
+                framebuffer.scissor = part
             framebuffer.use()
             self._vertices.render(moderngl.TRIANGLES, count, first=first)
-            device.timings.count(sum(width * height for _, _, width, height in parts), self.reads)
+        pixels = sum([width * height for _, _, width, height in regions])
+        device.timings.count(pixels, self.reads, len(regions) if cuts else 1)
         if blend:
             device.ctx.enable_only(moderngl.NOTHING)
-        if triangles is None and region is not None:
+        if cuts:
             framebuffer.scissor = None  # pyright: ignore[reportAttributeAccessIssue]
         device.fences.hold()
 

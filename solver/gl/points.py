@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -34,6 +35,20 @@ def draw_at(
 
     `more`: what it is told of each besides, (n, 4).
     """
+    return drawn_at(device, points, domain, shader, defines, components, more, **inputs)()
+
+
+def drawn_at(
+    device: Device,
+    points: np.ndarray,
+    domain: tuple[float, float],
+    shader: str,
+    defines: dict[str, object] | None = None,
+    components: int = 2,
+    more: np.ndarray | None = None,
+    **inputs: Any,
+) -> Callable[[], np.ndarray]:
+    """The same, drawn now and read back by what is returned, once: until then nothing waits for the GPU."""
     row = min(max(len(points), 1), _ROW)
     rows = in_rows(points / domain, row)
     size = row, len(rows)
@@ -42,7 +57,11 @@ def draw_at(
     listed = device.upload(rows, "points of a list")
     found = Field(device, size, components, "found at points", cleared=False)
     device.pass_(shader, POINTS=1, **(defines or {}))(found, points=listed, **inputs)
-    values = found.get().reshape(-1, components)[: len(points)]
-    for field in (listed, found):
-        field.release()
-    return values
+    listed.release()
+
+    def read() -> np.ndarray:
+        values = found.get().reshape(-1, components)[: len(points)]
+        found.release()
+        return values
+
+    return read

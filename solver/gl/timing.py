@@ -45,9 +45,9 @@ class Timings:
             self.milliseconds[self._stage] += (time.perf_counter() - self._since) * 1e3
         self._stage = "other"
 
-    def count(self, pixels: int, reads: int) -> None:
-        """Book one pass over `pixels` texels with `reads` texel reads each."""
-        self.passes[self._stage] += 1
+    def count(self, pixels: int, reads: int, passes: int = 1) -> None:
+        """Book passes over `pixels` texels together, with `reads` texel reads each."""
+        self.passes[self._stage] += passes
         self.texel_reads[self._stage] += pixels * reads
         self.texel_writes[self._stage] += pixels
 

@@ -7,6 +7,7 @@ of this folder.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from numbers import Integral
 from typing import Any
 
@@ -18,7 +19,7 @@ from solver.gl.device import Device
 from solver.gl.field import Field
 from solver.gl.images import for_images
 from solver.gl.passes import Region
-from solver.gl.points import draw_at
+from solver.gl.points import draw_at, drawn_at
 from solver.grid import Grid
 from solver.limits import check_finite, check_size, check_step, check_type, numbers, places, real_array
 from solver.state import State
@@ -440,10 +441,13 @@ class WarpMap:
         shader, defines = "warp/distortion.frag", self._held_defines()
         return draw_at(self.device, places(points), self.extent, shader, defines, **self._parts())[:, 1]
 
-    def strain(self, points: np.ndarray) -> np.ndarray:
-        """Displacement and strain close to points (n, 2), in longer sides: float32 (n, 4); see `warp/strain.frag`."""
+    def strain(self, points: np.ndarray) -> Callable[[], np.ndarray]:
+        """Displacement and strain close to points (n, 2), in longer sides, by `warp/strain.frag`; see `drawn_at`.
+
+        Reads back float32 (n, 4).
+        """
         shader, defines = "warp/strain.frag", self._held_defines()
-        return draw_at(self.device, places(points), self.extent, shader, defines, components=4, **self._parts())
+        return drawn_at(self.device, places(points), self.extent, shader, defines, components=4, **self._parts())
 
     def draw_strain(self, target: Field, region: Region) -> None:
         """Draw the same into a region of a field that is laid over the picture."""

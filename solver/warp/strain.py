@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from solver.gl.field import FieldPool
@@ -28,14 +30,24 @@ class Strain:
         Returns:
             float64 (n, 3).
         """
-        found = np.stack([self._on_lattice(places, radii), self._on_rings(places, radii)])
-        return np.stack([found[..., 0].min(axis=0), found[..., 1].max(axis=0), found[..., 2].min(axis=0)], axis=-1)
+        return self.look(places, radii)()
+
+    def look(self, places: np.ndarray, radii: np.ndarray) -> Callable[[], np.ndarray]:
+        """The same, by what is returned, called before the next look: until then nothing waits for the GPU."""
+        on_lattice, on_rings = self._on_lattice(places, radii), self._on_rings(places, radii)
+
+        def around() -> np.ndarray:
+            found = np.stack([on_lattice(), on_rings()])
+            least, most, area = found[..., 0].min(axis=0), found[..., 1].max(axis=0), found[..., 2].min(axis=0)
+            return np.stack([least, most, area], axis=-1)
+
+        return around
 
     def release(self) -> None:
         """Free the textures."""
         self._fields.release()
 
-    def _on_lattice(self, places: np.ndarray, radii: np.ndarray) -> np.ndarray:
+    def _on_lattice(self, places: np.ndarray, radii: np.ndarray) -> Callable[[], np.ndarray]:
         warp, extent = self._warp, np.array(self._warp.extent)
         cells = np.array(warp.coarse_size)
         count = np.maximum(cells, np.minimum(2 * cells, PLACES * extent / extent.max())).astype(int)
@@ -46,26 +58,35 @@ class Strain:
         warp.draw_strain(lattice, (*first.tolist(), *(end - first).tolist()))
         boxes = self._fields.get("boxes", (1, len(places)), 4)
         boxes.set(np.concatenate([low, high], axis=-1)[:, None])
-        found = self._fields.get("around", (int(count[1]), len(places)), 4)
-        region = 0, 0, int((high - low)[:, 1].max()), len(places)
-        step, last = tuple(extent / count), tuple(extent - extent / warp.size)
-        warp.device.pass_("warp/strain_around.frag")(
-            found, region=region, strain=lattice, boxes=boxes, step=step, last=last
-        )
-        rows = found.get(region).astype(np.float64)
-        return np.stack(
-            [rows[..., 0].min(axis=1), np.sqrt(rows[..., 1].max(axis=1)), rows[..., 2].min(axis=1)], axis=-1
-        )
 
-    def _on_rings(self, places: np.ndarray, radii: np.ndarray) -> np.ndarray:
+        def around() -> np.ndarray:
+            found = self._fields.get("around", (int(count[1]), len(places)), 4)
+            region = 0, 0, int((high - low)[:, 1].max()), len(places)
+            step, last = tuple(extent / count), tuple(extent - extent / warp.size)
+            warp.device.pass_("warp/strain_around.frag")(
+                found, region=region, strain=lattice, boxes=boxes, step=step, last=last
+            )
+            rows = found.get(region).astype(np.float64)
+            return np.stack(
+                [rows[..., 0].min(axis=1), np.sqrt(rows[..., 1].max(axis=1)), rows[..., 2].min(axis=1)], axis=-1
+            )
+
+        return around
+
+    def _on_rings(self, places: np.ndarray, radii: np.ndarray) -> Callable[[], np.ndarray]:
         warp, angles = self._warp, 2 * np.pi * np.arange(AROUND + 1) / AROUND
         rings = np.array(RINGS)[:, None, None] * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
         last = np.subtract(warp.extent, np.divide(warp.extent, warp.size))
         close = np.clip(places[:, None, None] + rings * radii[:, None, None, None], 0.0, last)
-        found = warp.strain(close.reshape(-1, 2)).astype(np.float64).reshape(*close.shape[:-1], 4)
-        original, most = close + found[..., :2], np.zeros(len(places))
-        for axis in (1, 2):
-            apart, far = (np.hypot(*np.moveaxis(np.diff(each, axis=axis), -1, 0)) for each in (original, close))
-            ratio = np.where(far > 1e-6, apart / np.maximum(far, 1e-6), 0.0)
-            most = np.maximum(most, ratio.max(axis=(1, 2)))
-        return np.stack([found[..., 2].min(axis=(1, 2)), most, found[..., 3].min(axis=(1, 2))], axis=-1)
+        read = warp.strain(close.reshape(-1, 2))
+
+        def around() -> np.ndarray:
+            found = read().astype(np.float64).reshape(*close.shape[:-1], 4)
+            original, most = close + found[..., :2], np.zeros(len(places))
+            for axis in (1, 2):
+                apart, far = (np.hypot(*np.moveaxis(np.diff(each, axis=axis), -1, 0)) for each in (original, close))
+                ratio = np.where(far > 1e-6, apart / np.maximum(far, 1e-6), 0.0)
+                most = np.maximum(most, ratio.max(axis=(1, 2)))
+            return np.stack([found[..., 2].min(axis=(1, 2)), most, found[..., 3].min(axis=(1, 2))], axis=-1)
+
+        return around

@@ -16,6 +16,7 @@ from PIL import Image
 
 from solver.gl.context import GPU, ContextError, NoSuchDevice
 from solver.gl.device import Device
+from support.gl_objects import living
 
 ROOT = Path(__file__).parents[2]
 NO_EGL = {"__EGL_VENDOR_LIBRARY_FILENAMES": "/nowhere.json"}  # the loader is there, but no driver for it
@@ -190,3 +191,17 @@ def test_full_graphics_memory_is_told_and_what_is_given_back_can_be_used(tmp_pat
         assert (ran.returncode, ran.stdout.strip()) == (status, told), ran.stderr
     assert ran.stderr == "fluidwarp: there is not enough memory; try a smaller --size or --grid\n"
     assert not list(tmp_path.iterdir())
+
+
+def test_a_field_that_is_dropped_leaves_nothing_behind_and_a_list_needs_no_framebuffer(device: Device):
+    kinds = "Texture", "Framebuffer"
+    before = living(device, *kinds)
+    for _ in range(3):
+        device.field((64, 64), 4).get()
+    assert living(device, *kinds) == before
+    listed = device.upload(np.ones((2, 3), np.float32))
+    assert living(device, "Framebuffer") == {"Framebuffer": before["Framebuffer"]}
+    assert (listed.get() == 1).all()
+    assert living(device, "Framebuffer") == {"Framebuffer": before["Framebuffer"] + 1}
+    listed.release()
+    assert living(device, *kinds) == before

@@ -137,6 +137,7 @@ def _handles(
     """
     in_hand = state.tool_name == "handle"
     alpha, hovered = 1.0 if in_hand else 0.45, pointer.hovered
+    shade, ground = packed(BLACK, 0.45 * alpha), packed(ui.palette.panel, 0.85 * alpha)
     for held in session.marks:
         start, now, target = (ImVec2(*view.to_screen(*place)) for place in (held.start, held.now, held.target))
         selected = in_hand and held.label == state.selected
@@ -148,24 +149,24 @@ def _handles(
             lines.add_circle(target, reach, packed(ink, 0.6), max(32, min(int(reach), 96)), ui.px(1.0))
         line: list[Any] = [ImVec2(*view.to_screen(*place)) for place in held.line]
         if line:
-            lines.add_polyline(line, packed(BLACK, 0.45 * alpha), ui.px(4.6), 0)
+            lines.add_polyline(line, shade, ui.px(4.6), 0)
             lines.add_polyline(line, packed(ink, 0.8 * alpha), ui.px(2.2), 0)
         if held.is_away and held.due:
             due: list[Any] = [ImVec2(*view.to_screen(*place)) for place in held.due]
-            lines.add_polyline(due, packed(BLACK, 0.45 * alpha), ui.px(3.4), 0)
+            lines.add_polyline(due, shade, ui.px(3.4), 0)
             lines.add_polyline(due, packed(WARN, 0.8 * alpha), ui.px(1.2), 0)
         if hypot(target.x - start.x, target.y - start.y) > ui.px(8):
-            for colour, width in ((packed(BLACK, 0.45 * alpha), 3.6), (packed(ink, 0.8 * alpha), 1.6)):
-                lines.add_line(start, target, colour, ui.px(width))
-            lines.add_circle_filled(start, ui.px(3.2), packed(BLACK, 0.45 * alpha), 16)
+            lines.add_line(start, target, shade, ui.px(3.6))
+            lines.add_line(start, target, packed(ink, 0.8 * alpha), ui.px(1.6))
+            lines.add_circle_filled(start, ui.px(3.2), shade, 16)
             lines.add_circle_filled(start, ui.px(2.2), packed(ink, alpha), 16)
         radius = ui.px(7 if selected or is_hovered else 6)
-        lines.add_circle_filled(target, radius + ui.px(1.4), packed(BLACK, 0.45 * alpha), 24)
-        lines.add_circle_filled(target, radius, packed(ui.palette.panel, 0.85 * alpha), 24)
+        lines.add_circle_filled(target, radius + ui.px(1.4), shade, 24)
+        lines.add_circle_filled(target, radius, ground, 24)
         lines.add_circle(target, radius, packed(ink, alpha), 24, ui.px(1.8))
         if held.is_away:
             lines.add_line(now, target, packed(WARN, alpha), ui.px(1.6))
-            lines.add_circle_filled(now, ui.px(4), packed(BLACK, 0.45 * alpha), 16)
+            lines.add_circle_filled(now, ui.px(4), shade, 16)
             lines.add_circle_filled(now, ui.px(3), packed(WARN, alpha), 16)
         else:
             lines.add_circle_filled(target, ui.px(2.6), packed(ink, alpha), 16)

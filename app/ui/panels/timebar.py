@@ -163,14 +163,15 @@ def _handles(
     """A bar for each handle and pin: bright while it is led, faint while it only holds; the selected one is white."""
     recipe, dt = session.recipe, session.dt
     led = labelled(recipe.handle, recipe.pin)
-    lanes = min(len(led), LANES)
+    if not led:
+        return
+    lanes, end, point = min(len(led), LANES), session.end * dt, ui.px(1)
+    first, room = top + ui.px(2), bottom - top - ui.px(4)
+    height = max(room / lanes - point, ui.px(1.5))
     for number, (label, one) in enumerate(led):
         last = one.last if isinstance(one, RecipeHandle) else one.start
-        ways = [(one.start, session.end * dt if one.end is None else one.end, 0.4), (one.start, last, 1.0)]
-        y = top + ui.px(2) + (bottom - top - ui.px(4)) * (number % lanes) / lanes
-        height = max((bottom - top - ui.px(4)) / lanes - ui.px(1), ui.px(1.5))
+        x, y = across(one.start / dt), first + room * (number % lanes) / lanes
         colour = ui.palette.text if label == state.selected else HANDLES
-        for start, end, alpha in ways:
-            low = ImVec2(across(start / dt), y)
-            high = ImVec2(max(across(end / dt), low.x + ui.px(2)), y + height)
-            draw.add_rect_filled(low, high, packed(colour, alpha), ui.px(1))
+        for until, alpha in ((end if one.end is None else one.end, 0.4), (last, 1.0)):
+            high = ImVec2(max(across(until / dt), x + 2 * point), y + height)
+            draw.add_rect_filled(ImVec2(x, y), high, packed(colour, alpha), point)
