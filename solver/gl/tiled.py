@@ -191,7 +191,7 @@ class TiledField(Field):
         for row in range(y // side, -(-(y + height) // side)):
             for column in range(x // side, -(-(x + width) // side)):
                 if self._same[row, column] is not None:
-                    self._be(row * columns + column, None)
+                    self._match(row * columns + column, None)
 
     def clear(self, *values: float) -> None:
         super().clear(*(values or self._blank_values))
@@ -202,7 +202,7 @@ class TiledField(Field):
         """This moment, sharing with earlier ones what is the same."""
         for place, (_, _, width, height) in enumerate(self.kind.regions):
             if self._same.flat[place] is None:
-                self._be(place, Tile(width * height * self.components * np.dtype(DTYPES[self.dtype]).itemsize))
+                self._match(place, Tile(width * height * self.components * np.dtype(DTYPES[self.dtype]).itemsize))
         return _held(SavedTiles(self.kind, self._same.copy(), self.blank))
 
     def restore(self, saved: SavedTiles) -> list[Region]:
@@ -227,7 +227,7 @@ class TiledField(Field):
                 self._copy(next(iter(tile.living)), region, (0, 0))
             else:
                 self._copy(tile.field, region, (-region[0], -region[1]))
-            self._be(place, tile)
+            self._match(place, tile)
             changed.append(region)
         return changed
 
@@ -246,10 +246,10 @@ class TiledField(Field):
         for region in tiles:
             self._copy(other, region, (0, 0))
             place = region[1] // self.tile * columns + region[0] // self.tile
-            self._be(place, other._same.flat[place])
+            self._match(place, other._same.flat[place])
 
-    def _be(self, place: int, tile: Tile | None) -> None:
-        """Be the same as a tile at a place, or None, as nothing; what was there is copied if it would be lost."""
+    def _match(self, place: int, tile: Tile | None) -> None:
+        """Note that it is the same as a saved tile at a place, or as none; copy what a save would lose."""
         before: Tile | None = self._same.flat[place]
         if before is not None and self in before.living:
             if before.holders and before.field is None and len(before.living) == 1:
