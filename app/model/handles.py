@@ -268,8 +268,8 @@ def labelled(handles: Sequence[RecipeHandle], pins: Sequence[RecipePin]) -> list
 
 
 def in_words(said: str) -> str:
-    """What messages say, with handles and pins called as the window does: handle 1 "smile" is handle[1] "smile"."""
-    return re.sub(r"\b(handle|pin)\[(\d+)\]", r"\1 \2", said)
+    """What messages say, with all called as the window does: handle 1 "smile" is handle[1] "smile", Size the radius."""
+    return re.sub(r"\b(handle|pin)\[(\d+)\]", r"\1 \2", said).replace("reach (radius)", "Size")
 
 
 def heading(said: str) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from app.errors import UserError
-from app.model.handles import RecipeHandle, RecipePin, labelled, objections
+from app.model.handles import RecipeHandle, RecipePin, heading, labelled, objections
 from app.model.recipe import Recipe
 from app.model.schema import frozen
 
@@ -174,3 +174,8 @@ def test_sixty_four_handles_and_pins_work() -> None:
     assert len(Recipe(handle=(handle(),) * 4, pin=pins).pin) == 60
     with pytest.raises(ValueError, match="65 handles and pins; at most 64 work"):
         Recipe(handle=(handle(),) * 5, pin=pins)
+
+
+def test_the_window_calls_the_radius_as_its_slider_is_called() -> None:
+    (said,) = objections([handle(to=[0.75, 0.5])], [], (1.0, 1.0))
+    assert heading(said) == "Handle 1 goes only 2 times as far as it reaches, of 2.5 to its goal; give it a larger Size"

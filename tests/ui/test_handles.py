@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from app.model.handles import ARRIVED, MOST_HANDLES, MOST_LINES
 from app.model.recipe import Recipe
 from app.progress import Progress
 from app.ui.events import Mods
+from app.ui.widgets import Ui
 from app.work import journal
 from app.work.export import run
 from app.work.jobs import Job, Outputs
@@ -377,3 +379,22 @@ def test_the_window_a_file_the_journal_and_the_command_line_give_the_same_bytes(
     assert fluidwarp(tmp_path, "render", "w.fluidwarp", "-o", files[0].name).returncode == 0
     run(device, Job(session.recipe, session.project.picture, session.project.folder, Outputs(files[1])), Progress())
     assert np.array_equal(read_picture(files[0]).pixels, read_picture(files[1]).pixels)
+
+
+def test_a_line_whose_places_have_goals_of_their_own_tells_why_it_has_no_rotate(
+    robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    written, told = Ui.wrapped, list[str]()
+
+    def noting(ui: Ui, text: str, *given: Any) -> None:
+        told.append(text)
+        written(ui, text, *given)
+
+    monkeypatch.setattr(Ui, "wrapped", noting)
+    line: dict[str, Any] = {"points": ((0.4, 0.5), (0.6, 0.5))}
+    for goals, tells in ({"to": (0.5, 0.55)}, False), ({"goals": ((0.4, 0.5), (0.6, 0.6))}, True):
+        robot.editor.session.edit("Line", handle=Recipe.model_validate({"handle": (line | goals,)}).handle)
+        robot.editor.state.selected = "handle[1]"
+        told.clear()
+        robot.frame()
+        assert any("No Rotate" in text for text in told) == tells

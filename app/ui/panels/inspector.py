@@ -191,7 +191,9 @@ def _handles(ui: Ui, workspace: Workspace, state: EditorState, do: Do) -> None:
                 title="Local", more="At 0 % the picture flows back beside it. At 100 % only what is under it moves.",
             )  # fmt: skip
             _set_held(session, label, f"Flow of a {led.kind}", slid, local=slid.value)
-            if not led.goals:
+            if led.goals:
+                ui.wrapped("No Rotate or Scale: each place of this line has its own goal.", ui.palette.dim, 13)
+            else:
                 _turn(ui, session, label, led)
         if ui.button("Remove", width=-1, height=30):
             do("remove")
