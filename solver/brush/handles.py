@@ -246,7 +246,7 @@ class Handles:
         centres = [ring.centre for ring in rings]
         soft, shares = np.concatenate([soft, softs[centres]]), np.concatenate([shares, np.ones(len(rings))])
         owners = [np.concatenate([np.repeat(numbers[each], 2), numbers[centres]]) for each in (pushed, drawn)]
-        influence, bounds = _with_rings(places, pushed, push, rings), FARTHEST_STEP * reaches / dt
+        influence, bounds = _with_rings(places, pushed, push, rings), FARTHEST_STEP * np.minimum(reaches, side) / dt
         del push  # of many points it is as large as all that balancing needs
         balance = Balance(influence, soft, shares, (owners[0], owners[1]), bounds)
         self._places[listed] += wanted * dt  # where to look for them
