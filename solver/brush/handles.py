@@ -232,7 +232,10 @@ class Handles:
             local, part = pushes.local_influence(places)[:, :, : len(pushed)], local_parts[:, None]
             both = _matrix(((1 - part) * push[:, :, : len(pushed)] + part * local)[pushed])
             carried = part * solved(system(both, soft), wanted[pushed].ravel()).reshape(-1, 2)
-            wanted = wanted - np.einsum("iajb,jb->ia", local, carried)
+            moved = np.einsum("iajb,jb->ia", local, carried)
+            # At odds they drive one another on: together they carry a point no farther than one handle goes.
+            over = max(float((np.hypot(*moved[pushed].T) / (FARTHEST_STEP * radii[pushed] / dt)).max()), 1.0)
+            carried, wanted = carried / over, wanted - moved / over
         centres = [ring.centre for ring in rings]
         soft, weights = np.concatenate([soft, softs[centres]]), np.concatenate([weights, np.ones(len(rings))])
         owners = [np.concatenate([np.repeat(numbers[each], 2), numbers[centres]]) for each in (pushed, drawn)]
