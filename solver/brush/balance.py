@@ -11,11 +11,14 @@ CLOSE = 1.01  # times its bound where that ends; by as much as one still exceeds
 
 
 class Balance:
-    """Least squares as (H3) for pushes of handles and turns of rings, weighed so that every push is within its bound.
+    """Least squares as (H3) for pushes of handles and turns of rings, with a bound for every push.
+
+    Those of one width that overlap keep the bound together, too.
 
     Args:
         influence: what each unknown does to each thing that is wanted, K, (n, k); of the unknowns the first 2 m are the
-            forces of m pushes, the others are not bounded.
+            forces of m pushes, the others are not bounded. First of these is a narrow one for each point that is wanted
+            to move, in their order; wide ones follow.
         soft: what is added to the squares of each that is wanted, (n,).
         shares: what the unknowns count there, W, (k,).
         owners: of each that is wanted, (n,), and of each unknown, (k,), the number of its handle.
@@ -32,10 +35,16 @@ class Balance:
     ) -> None:
         self._influence, self._soft, self._shares, self._owners = influence, soft, shares, owners
         self._bounds = np.concatenate([np.repeat(bounds, 2), np.full(len(shares) - 2 * len(bounds), np.inf)])
+        self._pushes = 2 * len(bounds)
         self._of_all = system(influence, soft, shares)
 
     def strengths(self, wanted: np.ndarray) -> np.ndarray:
         """Of all unknowns, (k,), for what is wanted, (n,)."""
+        found = self._each_within(wanted)
+        return found / max(self._over_together(found), 1.0)
+
+    def _each_within(self, wanted: np.ndarray) -> np.ndarray:
+        """The same, every push within its bound, however many lie on one another."""
         found = solved(self._of_all, wanted)
         if self._over(found).max(initial=0.0) <= 1:
             return found
@@ -51,6 +60,23 @@ class Balance:
             shares = np.minimum(self._shares, shares / np.maximum(over, 1e-30))
             found = solved(system(self._influence, self._soft, shares), wanted)
         return found / max(self._over(found).max(), 1.0)
+
+    def _over_together(self, found: np.ndarray) -> float:
+        """How many times the bound of one push the narrow ones move a point together, or the wide ones, at most.
+
+        Of many that lie on one another each may be within its own. And where narrow ones and wide ones are opposed,
+        they cancel at the points, but not around them.
+        """
+        turns = self._influence.shape[1] - self._pushes
+        points = len(self._influence) - turns
+        narrow, wide = slice(0, points), slice(points, self._pushes)
+
+        def over(kind: slice, bounds: np.ndarray) -> float:
+            moved = np.hypot(*(self._influence[:points, kind] @ found[kind]).reshape(-1, 2).T)
+            return float((moved / bounds).max(initial=0.0))
+
+        over_narrow = over(narrow, self._bounds[:points:2])
+        return max(over_narrow, over(wide, self._bounds[wide].max())) if wide.stop > wide.start else over_narrow
 
     def _as_one(self, wanted: np.ndarray) -> np.ndarray:
         """What is wanted of each handle, all in the proportion that its own pushes would bear if it were alone."""

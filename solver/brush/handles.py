@@ -44,7 +44,7 @@ WIDE, WIDE_SHARE = 3.0, 0.2
 SLOWING, STOPPED = 0.92, 0.8
 SLOWING_LOCAL, STOPPED_LOCAL = 0.4, 0.22
 STRETCHING, TORN = 8.0, 12.0
-# Seconds in which what a handle lacks is halved, or it lets go: with nothing in its way it falls to a fiftieth.
+# Seconds in which a handle halves the way it has left, or it lets go: with nothing in its way a fiftieth is left then.
 PATIENCE = 4 / RATE
 CORE = 0.5  # of the radius of what turns or swells, where it does so evenly
 FOUND = 1e-7  # longer sides, as places are rounded
@@ -72,14 +72,14 @@ class Ring(NamedTuple):
         return float(np.hypot(*self.arms.T).mean())
 
 
-class Ways(NamedTuple):
-    """What the points of active handles have before them in a step.
+class Targets(NamedTuple):
+    """Where the points of active handles are and where they shall be in a step.
 
     Attributes:
         rows: of each handle, where its points are listed.
         here: where they are, (n, 2).
         now, then: where they shall be now and a step later, (n, 2).
-        left: what the farthest point of each handle has to go, (h,).
+        remaining: how far the farthest point of each handle has to go, (h,).
         is_led: which handles shall not be where they began.
     """
 
@@ -87,7 +87,7 @@ class Ways(NamedTuple):
     here: np.ndarray
     now: np.ndarray
     then: np.ndarray
-    left: np.ndarray
+    remaining: np.ndarray
     is_led: np.ndarray
 
 
@@ -141,7 +141,7 @@ class Handles:
         self._brush, self._strain = Brush(fluid.device), Strain(warp)
         # Where the points of those that have begun are, and were then; NaN for the others.
         self._places = self._starts = np.zeros((0, 2))
-        self._lacks = np.zeros((0, 2))  # of each the least that it lacked, and for how long it has not been halved
+        self._progress = np.zeros((0, 2))  # of each the least way it has had left, and for how long that is not halved
         self._shapes: list[Shape] = []
         self._counts = np.zeros(0, int)
         self._lead: Lead | None = None  # of the present step
@@ -166,7 +166,7 @@ class Handles:
         ridges = np.repeat([RIDGE_OF_LINES if handle.points else RIDGE for handle in handles], self._counts)
         self._soft = 1 / self._stiffness - 1 + ridges
         self._places, self._starts = (self._fitted(kept, before) for kept in (self._places, self._starts))
-        self._lacks = self._fitted_lacks(self._lacks)
+        self._progress = self._fitted_progress(self._progress)
 
     # -- a step -----------------------------------------------------------------------------------------------------
 
@@ -197,40 +197,28 @@ class Handles:
             self._lead = None
             return
         radii, counts = self._radii[listed], self._counts[in_force]
-        strain = self._strain.look(self._places[listed], radii)  # drawn while the pushes are found
-        ways = self._ways(active, listed, time, dt)
-        rows, places = ways.rows, ways.here
-        rings, loops, is_pushed = list[Ring](), list[slice](), np.ones(len(listed), bool)
-        swelling_tips = list[tuple[int, Tip, float]]()
-        for which, (number, each) in enumerate(zip(active, rows, strict=True)):
-            shape, local = self._shapes[number], self._shapes[number].handle.local
-            if shape.is_ring:
-                around = slice(each.start + 1, each.stop)
-                tip = _tip(places[each.start], shape.handle.radius)
-                rings.append(Ring(each.start, around, places[around] - places[each.start], tip))
-                is_pushed[around] = False
-                swelling_tips.append((which, tip, 0.0))
-            elif shape.around is not None:
-                loops.append(each)
-                middle = places[each].mean(axis=0)
-                tip = _tip(middle, max(float(np.hypot(*(places[each] - middle).T).max()) / CORE, SMALLEST))
-                swelling_tips.append((which, tip, local))
-        pushed = np.flatnonzero(is_pushed)
-        share = self._local[listed][pushed]
+        # A software rasteriser draws the strain while the processor finds the pushes: it is read after them.
+        strain_read = self._strain.look(self._places[listed], radii)
+        targets = self._targets(active, listed, time, dt)
+        rows, places = targets.rows, targets.here
+        rings, loops, swelling_tips, pushed = self._areas(active, targets)
+        local_parts = self._local[listed][pushed]
         side = min(self._fluid.grid.picture)
         wide = np.maximum(np.minimum(WIDE * radii, side), radii)
         numbers = np.repeat(np.arange(len(rows)), counts)
-        is_led, is_away = ways.is_led[numbers], self._are_away(ways)[numbers]
+        is_led, is_away = targets.is_led[numbers], self._are_away(targets)[numbers]
         beside = _beside(places, radii, numbers, is_led)[pushed]
-        many = np.flatnonzero(beside)
-        drawn, shares = np.concatenate([pushed, pushed[many]]), np.ones(len(pushed))
-        reaches = np.concatenate([radii[pushed], wide[pushed[many]]])
-        shares = np.repeat(np.concatenate([shares, WIDE_SHARE * beside[many]]), 2)
+        near_others = np.flatnonzero(beside)  # of those that are pushed: they have a wide push, too
+        drawn = np.concatenate([pushed, pushed[near_others]])
+        reaches = np.concatenate([radii[pushed], wide[pushed[near_others]]])
+        weights = np.repeat(np.concatenate([np.ones(len(pushed)), WIDE_SHARE * beside[near_others]]), 2)
         pushes = Pushes(self._fluid.grid, places[drawn], reaches)
         push, carried = pushes.influence(places), np.zeros((len(pushed), 2))
-        slower = _of_each(np.minimum, self._slower(strain(), listed), rows)  # a whole goes as slowly as its slowest
-        slower = np.repeat(slower * self._progressing(active, ways, dt), counts)
-        wanted, growths = self._wanted(active, slower, ways, dt)
+        slower = _of_each(
+            np.minimum, self._slower(strain_read(), listed), rows
+        )  # a whole goes as slowly as its slowest
+        slower = np.repeat(slower * self._progressing(active, targets, dt), counts)
+        wanted, growths = self._wanted(active, slower, targets, dt)
         for which, tip, local in swelling_tips:
             self._brush.expand(self._fluid, tip, (1 - local) * growths[which])
         self._calm(places[pushed], np.where(is_led & is_away, wide, radii)[pushed], 1 - slower[pushed])
@@ -238,17 +226,22 @@ class Handles:
         firm = np.where(is_led, np.maximum(slower, LEAST_STIFFNESS), 1.0)
         softs = self._soft[listed] + (1 / firm - 1) / self._stiffness[listed]
         soft = np.repeat(softs[pushed], 2)
-        if share.any():  # what is local is shared out first: the fluid would else do all of it, going on by itself
-            local, part = pushes.local_influence(places)[:, :, : len(pushed)], share[:, None]
+        if (
+            local_parts.any()
+        ):  # what is local is shared out first: the fluid would else do all of it, going on by itself
+            local, part = pushes.local_influence(places)[:, :, : len(pushed)], local_parts[:, None]
             both = _matrix(((1 - part) * push[:, :, : len(pushed)] + part * local)[pushed])
             carried = part * solved(system(both, soft), wanted[pushed].ravel()).reshape(-1, 2)
-            wanted = wanted - np.einsum("iajb,jb->ia", local, carried)
+            moved = np.einsum("iajb,jb->ia", local, carried)
+            # At odds they drive one another on: together they carry a point no farther than one handle goes.
+            over = max(float((np.hypot(*moved[pushed].T) / (FARTHEST_STEP * radii[pushed] / dt)).max()), 1.0)
+            carried, wanted = carried / over, wanted - moved / over
         centres = [ring.centre for ring in rings]
-        soft, shares = np.concatenate([soft, softs[centres]]), np.concatenate([shares, np.ones(len(rings))])
+        soft, weights = np.concatenate([soft, softs[centres]]), np.concatenate([weights, np.ones(len(rings))])
         owners = [np.concatenate([np.repeat(numbers[each], 2), numbers[centres]]) for each in (pushed, drawn)]
-        influence, bounds = _with_rings(places, pushed, push, rings), FARTHEST_STEP * reaches / dt
+        influence, bounds = _with_rings(places, pushed, push, rings), FARTHEST_STEP * np.minimum(reaches, side) / dt
         del push  # of many points it is as large as all that balancing needs
-        balance = Balance(influence, soft, shares, (owners[0], owners[1]), bounds)
+        balance = Balance(influence, soft, weights, (owners[0], owners[1]), bounds)
         self._places[listed] += wanted * dt  # where to look for them
         lead = self._lead = Lead(places, radii, pushed, pushes, drawn, rings, loops, balance, wanted, carried)
         self._fluid.impulse.add(lambda faces: self._give(lead, faces))
@@ -315,7 +308,7 @@ class Handles:
         if not self._shapes:
             return found
         slower = self._slower(self._strain.around(self._located_or_waiting(), self._radii), np.arange(len(self._at)))
-        for shape, rows, (_, waited) in zip(self._shapes, self._rows, self._lacks, strict=True):
+        for shape, rows, (_, waited) in zip(self._shapes, self._rows, self._progress, strict=True):
             starts = self._starts[rows]
             if np.isnan(starts).any():
                 found.append(None if shape.is_in_picture else "outside")
@@ -346,7 +339,7 @@ class Handles:
 
     def save(self) -> State:
         """A copy of this moment."""
-        kept = {"places": self._places, "starts": self._starts, "counts": self._counts, "lacks": self._lacks}
+        kept = {"places": self._places, "starts": self._starts, "counts": self._counts, "progress": self._progress}
         return State({}, {name: values.copy() for name, values in kept.items()})
 
     def restore(self, state: State) -> None:
@@ -364,10 +357,10 @@ class Handles:
             if kept is None or kept.dtype != np.float64 or kept.shape != (counts.sum(), 2):
                 raise ValueError("the state of handles is missing")
         self._places, self._starts = (self._fitted(state.values[name], counts) for name in ("places", "starts"))
-        lacks = state.values.get("lacks")
-        if lacks is None or lacks.dtype != np.float64 or lacks.shape != (len(counts), 2):
+        progress = state.values.get("progress")
+        if progress is None or progress.dtype != np.float64 or progress.shape != (len(counts), 2):
             raise ValueError("the state of handles is missing")
-        self._lacks = self._fitted_lacks(lacks)
+        self._progress = self._fitted_progress(progress)
         self._lead = None
 
     def release(self) -> None:
@@ -388,8 +381,8 @@ class Handles:
                 rows[here] = part
         return rows
 
-    def _fitted_lacks(self, kept: np.ndarray) -> np.ndarray:
-        """What was kept of some handles, for those of now: what is new has lacked nothing yet."""
+    def _fitted_progress(self, kept: np.ndarray) -> np.ndarray:
+        """What was kept of some handles, for those of now: what is new has not begun yet."""
         found = np.tile([np.inf, 0.0], (len(self.handles), 1))
         found[: len(kept)] = kept[: len(found)]
         return found
@@ -419,7 +412,7 @@ class Handles:
             found[waiting] = self._at[waiting] + self._forward.at(self._at[waiting])
         return found
 
-    def _ways(self, active: list[int], listed: np.ndarray, time: float, dt: float) -> Ways:
+    def _targets(self, active: list[int], listed: np.ndarray, time: float, dt: float) -> Targets:
         """Those of these handles, with the numbers of all their points."""
         rows, starts, here = _runs(self._counts[active]), self._starts[listed], self._places[listed]
         shapes = [self._shapes[number] for number in active]
@@ -428,26 +421,51 @@ class Handles:
             for at in (time, time + dt)
         )
         is_led = _of_each(np.maximum, np.abs(then - starts).max(axis=1), rows) > FOUND
-        return Ways(rows, here, now, then, _farthest(then - here, rows), is_led)
+        return Targets(rows, here, now, then, _farthest(then - here, rows), is_led)
 
-    def _progressing(self, active: list[int], ways: Ways, dt: float) -> np.ndarray:
+    def _areas(
+        self, active: list[int], targets: Targets
+    ) -> tuple[list[Ring], list[slice], list[tuple[int, Tip, float]], np.ndarray]:
+        """Rings and closed lines among these handles, the brushes that swell them, and the points that are pushed.
+
+        Of each brush: whose it is, by its place among these; its tip; the local part of the motion, unswelled.
+        """
+        places, is_pushed = targets.here, np.ones(len(targets.here), bool)
+        rings, loops, swelling_tips = list[Ring](), list[slice](), list[tuple[int, Tip, float]]()
+        for which, (number, each) in enumerate(zip(active, targets.rows, strict=True)):
+            shape = self._shapes[number]
+            if shape.is_ring:
+                around = slice(each.start + 1, each.stop)
+                tip = _tip(places[each.start], shape.handle.radius)
+                rings.append(Ring(each.start, around, places[around] - places[each.start], tip))
+                is_pushed[around] = False
+                swelling_tips.append((which, tip, 0.0))
+            elif shape.around is not None:
+                loops.append(each)
+                middle = places[each].mean(axis=0)
+                tip = _tip(middle, max(float(np.hypot(*(places[each] - middle).T).max()) / CORE, SMALLEST))
+                swelling_tips.append((which, tip, shape.handle.local))
+        return rings, loops, swelling_tips, np.flatnonzero(is_pushed)
+
+    def _progressing(self, active: list[int], targets: Targets, dt: float) -> np.ndarray:
         """1 for each of these handles; 0 for what comes no nearer to its goal, as long as nobody's goal moves."""
-        lacks = ways.left
-        if np.abs(ways.then - ways.now).max() > FOUND * dt:
-            self._lacks[active] = np.inf, 0.0
-        least, waited = self._lacks[active].T
-        nearer = lacks < least / 2
-        least, waited = np.where(nearer, lacks, least), np.where(nearer, 0.0, waited + dt)
-        self._lacks[active] = np.stack([least, waited], axis=-1)
-        return np.where((waited > PATIENCE) & self._are_away(ways), 0.0, 1.0)
+        if np.abs(targets.then - targets.now).max() > FOUND * dt:
+            self._progress[active] = np.inf, 0.0
+        least, waited = self._progress[active].T
+        nearer = targets.remaining < least / 2
+        least, waited = np.where(nearer, targets.remaining, least), np.where(nearer, 0.0, waited + dt)
+        self._progress[active] = np.stack([least, waited], axis=-1)
+        return np.where((waited > PATIENCE) & self._are_away(targets), 0.0, 1.0)
 
-    def _are_away(self, ways: Ways) -> np.ndarray:
+    def _are_away(self, targets: Targets) -> np.ndarray:
         """True for handles of which the farthest point has more than a texel to go."""
-        return ways.left > 1 / max(self._warp.size)
+        return targets.remaining > 1 / max(self._warp.size)
 
-    def _wanted(self, active: list[int], slower: np.ndarray, ways: Ways, dt: float) -> tuple[np.ndarray, list[float]]:
+    def _wanted(
+        self, active: list[int], slower: np.ndarray, targets: Targets, dt: float
+    ) -> tuple[np.ndarray, list[float]]:
         """How the points of these handles shall move in this step, longer sides / s, and areas within grow, 1 / s."""
-        back, (rows, here, now, then, *_) = -math.expm1(-RATE * dt), ways
+        back, (rows, here, now, then, *_) = -math.expm1(-RATE * dt), targets
         step = slower[:, None] * (then - now + back * (now - here))
         most = FARTHEST_STEP * np.array([self._shapes[number].handle.reach for number in active])
         parts = np.minimum(1.0, most / np.maximum(_farthest(step, rows), 1e-30))
@@ -542,23 +560,23 @@ class Handles:
             return
         fluid, grid = self._fluid, self._fluid.grid
         found = self._probed(lead, faces)
-        lacks = lead.wanted - found[:, :2]
+        missing = lead.wanted - found[:, :2]
         for loop in lead.loops:  # the fluid swells by itself: (H4)
             arms = lead.places[loop] - lead.places[loop].mean(axis=0)
-            lacks[loop] -= swelling(lead.places[loop], lacks[loop]) / 2 * arms
-        told = np.concatenate([lacks[lead.pushed].ravel(), _spins(lacks, lead.rings)])
-        strengths, count = lead.balance.strengths(told), 2 * len(lead.drawn)
-        lacking, spins = strengths[:count].reshape(-1, 2), strengths[count:]
+            missing[loop] -= swelling(lead.places[loop], missing[loop]) / 2 * arms
+        asked = np.concatenate([missing[lead.pushed].ravel(), _spins(missing, lead.rings)])
+        strengths, count = lead.balance.strengths(asked), 2 * len(lead.drawn)
+        forces, spins = strengths[:count].reshape(-1, 2), strengths[count:]
         masks: dict[str, Any] = {}
         if attenuated:
-            lacking *= found[lead.drawn, 2:3]
+            forces *= found[lead.drawn, 2:3]
             masks["thickest"] = self._thickest
             fluid.device.pass_("brush/thickest.frag")(self._thickest, viscosity=fluid.viscosity)
         for ring, spin in zip(lead.rings, spins.tolist(), strict=True):
             self._spin(ring, spin, faces, found[ring.centre], **attenuated)
         self._stream.clear()
         stream = fluid.device.pass_("brush/handle_stream.frag", **attenuated)
-        lead.pushes.draw(fluid.device, stream, self._stream, found[lead.drawn, 3], lacking, **masks)
+        lead.pushes.draw(fluid.device, stream, self._stream, found[lead.drawn, 3], forces, **masks)
         fluid.device.pass_("brush/curl.frag")(faces, add=True, stream=self._stream, spacing=grid.spacing)
 
 

@@ -80,3 +80,17 @@ def test_however_few_rounds_there_is_room_for_no_push_exceeds_its_bound(
         assert sizes(found).max() <= 1 + 1e-9
         left.append(float(np.linalg.norm(wanted - influence @ found)))
     assert left[0] > left[1] > left[2] == left[3]
+
+
+def test_pushes_that_lie_on_one_another_do_no_more_together_than_one_may():
+    """Forty narrow ones against forty wide ones, which hardly move the points, would do so all the more beside them."""
+    grid, places = Grid(32, 32), np.concatenate([np.full((40, 2), 0.4), [[0.55, 0.4]]])
+    pushes = Pushes(grid, np.concatenate([places, places]), np.repeat([0.2, 0.6], 41))
+    influence, bounds = pushes.influence(places).reshape(82, 164), np.repeat([1.0, 3.0], 41)
+    each = np.zeros(82, int), np.zeros(164, int)
+    found = Balance(influence, np.full(82, 1e-4), np.ones(164), each, bounds).strengths(
+        np.random.default_rng(1).normal(size=82) * 100
+    )
+    assert sizes(found).max() <= 3
+    for kind, bound in ((slice(0, 82), 1.0), (slice(82, 164), 3.0)):
+        assert sizes(influence[:, kind] @ found[kind]).max() <= bound + 1e-9

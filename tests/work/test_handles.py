@@ -299,6 +299,40 @@ def test_a_map_that_only_slows_a_handle_down_does_not_keep_it_from_its_goal(devi
     replay.release()
 
 
+SHORT = [[0.5954, 0.8611], [0.5953, 0.8612], [0.5953, 0.8611]]  # all its points lie on one another
+BESIDE = [[0.5364, 0.6153], [0.536, 0.6153], [0.5356, 0.6153], [0.536, 0.6153]]
+TOO_STRONG = {
+    "short lines that are opened, each in the other's way": (
+        (96, 128),
+        [],
+        [
+            {"points": SHORT, "goals": [[0.25, 0.25], [0.81, 0.26], [0.63, 0.0]], "to": [0.848, 0.576]}
+            | {"duration": 0.01, "local": 1.0, "radius": 0.114, "rotate": 359.0},
+            {"at": [0.1886, 0.7574], "points": BESIDE, "goals": BESIDE, "to": [0.86, 0.48]},
+        ],
+    ),
+    "a line that reaches much farther than the picture is high": (
+        (20, 200),
+        [{"kind": "path", "points": [[0.5, 0], [0.5, 1]], "radius": 0.1, "range": [1e-3, 1.0]}],
+        [
+            {"points": [[0.95, 0.5], [0.57, 0.58], [0.75, 0.75], [0.8, 0.28]], "to": [0.96, 0.03], "rotate": -73.0}
+            | {"radius": 1.0, "duration": 0.1}
+        ],
+    ),
+}
+
+
+@pytest.mark.parametrize("name", TOO_STRONG)
+def test_pushes_that_would_be_too_strong_together_fold_nothing(name: str, device: Device):
+    size, thicker, handles = TOO_STRONG[name]
+    parts = {"fluid": {"grid": 32, "viscosity": 0.0065}, "duration": 0.1, "viscosity": thicker, "handle": handles}
+    replay = replay_of(device, np.zeros((*size, 3), np.uint8), **parts)
+    for _ in range(replay.recipe.ticks):
+        replay.advance()
+        assert replay.warp.statistics().folds == 0
+    replay.release()
+
+
 def test_what_is_frozen_beside_a_handle_is_told(device: Device):
     """Farther off than it reaches it is not."""
     frozen_disc = {"kind": "path", "points": [[0.65, 0.5]], "radius": 0.05, "hardness": 1.0}
