@@ -6,7 +6,7 @@ import tracemalloc
 
 import numpy as np
 
-from solver import Device, Fluid, Grid, WarpMap
+from solver import Device, Fluid, Grid, Handle, Handles, WarpMap
 from solver.brush.brush import Brush
 from solver.brush.listed import draw_listed
 from solver.brush.push import Push
@@ -87,4 +87,29 @@ def test_each_of_several_pushes_slips_as_it_would_by_itself(device: Device):
         assert np.abs(one).max() > 0
         np.testing.assert_array_equal(one, other)
     for thing in (*brushes, warp, fluid, velocity):
+        thing.release()
+
+
+def test_many_led_points_take_little_more_than_their_matrix_and_leave_nothing(device: Device):
+    """Lines and points that are turned: what they do to each other is held once, and one copy to solve for it."""
+    handles = [
+        Handle((0.05 + 0.1 * k, 0.5), (0.5, 0.5), points=((0.05 + 0.1 * k, 0.1), (0.05 + 0.1 * k, 0.9)), radius=0.06)
+        for k in range(10)
+    ]
+    handles += [Handle((0.05 + 0.1 * k, 0.3), (0.5, 0.5), rotate=90, radius=0.06) for k in range(10)]
+    fluid = Fluid(device, Grid(32, 32))
+    warp = WarpMap(device, fluid.grid)
+    led = Handles(fluid, warp, handles)
+    led.lead(1 / 60, fluid.time)
+    assert led._lead is not None
+    matrix = led._lead.balance._influence.nbytes
+    assert matrix > 2**21
+    led.carry()
+    tracemalloc.start()
+    led.advance(1 / 60)
+    left, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert left < matrix / 4
+    assert most < 3 * matrix
+    for thing in (led, warp, fluid):
         thing.release()
