@@ -11,8 +11,8 @@ from solver.gl.context import Context
 from solver.gl.field import DoubleField, Field, FieldError
 from solver.gl.passes import Pass
 
-# Passes that are kept compiled. Painting with all tools asks for some 200, and a frame for 60; Mesa keeps the code of each
-# in memory, 1 to 15 MiB, and there are thousands of sets of defines.
+# Passes that are kept compiled. Painting with all tools asks for some 200, and a frame for 60. Mesa keeps the code of
+# each in memory, 1 to 15 MiB, and there are thousands of sets of defines.
 MOST_PASSES = 192
 
 

@@ -21,6 +21,7 @@ from app.media import files
 from app.media.codecs.cmyk import cmyk_to_rgb
 from app.media.codecs.exr import read_channels
 from app.media.depth import to_bits
+from app.media.encoders import check_output
 from app.media.ffmpeg import executable
 from app.media.pictures import read_picture, write_picture
 from app.model.picture import Picture, linear_to_srgb, srgb_to_linear
@@ -788,6 +789,19 @@ def test_names_that_cannot_be_written(tmp_path: Path):
     }.items():
         with pytest.raises(UserError, match=message):
             write_picture(tmp_path / name, picture)
+    for name, message in {
+        tmp_path / "a": "must end in one of .* an animation's in",
+        tmp_path: "it is a folder; give the name of a file in it",
+        "/dev/null": "it is not an ordinary file; give another name",
+        tmp_path / "nowhere" / "a": "there is no folder",
+    }.items():
+        with pytest.raises(UserError, match=f"^Cannot write {name}: {message}"):
+            check_output(name)
+    reading, writing = os.pipe()
+    with pytest.raises(UserError, match="it is not an ordinary file; give another name"):
+        check_output(f"/dev/fd/{writing}")
+    os.close(reading)
+    os.close(writing)
     with pytest.raises(UserError, match="WebP holds no side longer than 16383; make it smaller"):
         write_picture(tmp_path / "a.webp", Picture(np.zeros((1, 17000, 3), np.uint8)))
     assert sorted(path.name for path in tmp_path.iterdir()) == ["device.png", "folder.png"]
