@@ -623,6 +623,16 @@ def test_primaries_that_a_format_cannot_tell_are_told(folder: Path, fluidwarp: R
     assert fluidwarp(folder, "render", "a.toml", "aces.exr", "-o", "x.exr").stderr == ""
 
 
+@pytest.mark.parametrize("words", [["render", "a.toml"], ["apply", "m.npy"]])
+def test_dots_per_inch_that_a_jpeg_cannot_tell_are_told(folder: Path, fluidwarp: Run, words: list[str]):
+    write_picture(folder / "p.tif", Picture(np.zeros((48, 64, 3), np.uint8), dpi=(72.5, 72.5)))
+    write_map(folder / "m.npy", Displacement(np.zeros((48, 64, 2), np.float32)))
+    told = "fluidwarp: x.jpg says 72 dpi and not 72.5 as the picture: JPEG holds whole numbers\n"
+    for more, said in ([], told), (["--strip"], ""), (["--dpi", "300"], ""):
+        ran = fluidwarp(folder, *words, "p.tif", "-o", "x.jpg", *more)
+        assert (ran.returncode, ran.stderr) == (0, said)
+
+
 def options() -> Iterator[str]:
     """Each command, and for each of its words how it is called, what it takes, and what it is where it is left out."""
     for command in cli.cli.registered_commands:

@@ -12,7 +12,7 @@ from pathlib import Path
 from app.errors import UserError
 from app.media import ffmpeg
 from app.media.clip import USUAL, Clip, Colours
-from app.media.files import NUMBER, is_sequence
+from app.media.files import NUMBER, is_sequence, writable
 from app.media.formats import FORMATS, check_picture_output
 from app.media.losses import lost
 from app.media.video import NAMES
@@ -329,6 +329,7 @@ def check_output(
         check_animation(path, fps, codec, size)
         return
     if Path(path).suffix.lower() not in FORMATS:
+        writable(path)  # of a folder or a device it is not the name's ending that is told
         endings = f"a picture's name must end in one of {' '.join(FORMATS)}, an animation's in {' '.join(ANIMATIONS)}"
         raise UserError(f"Cannot write {path}: {endings}.")
     check_picture_output(path, bits, size, codec)

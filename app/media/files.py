@@ -67,7 +67,7 @@ def writable(path: str | os.PathLike[str]) -> Path:
     try:
         if target.is_dir():
             raise UserError(f"Cannot write {path}: it is a folder; give the name of a file in it.")
-        if target.exists() and not target.is_file():
+        if os.path.exists(path) and not os.path.isfile(path):  # a pipe's real path is no file's name
             raise UserError(f"Cannot write {path}: it is not an ordinary file; give another name.")
         if not target.parent.is_dir():
             raise UserError(f"Cannot write {path}: there is no folder {target.parent}; make it first.")

@@ -52,6 +52,7 @@ ONLY_READ = {
     "PGM": (".pgm",), "PNM": (".pnm",), "PPM": (".ppm",), "QOI": (".qoi",), "SGI": (".sgi",), "TGA": (".tga",),
 }  # fmt: skip
 EMBEDDED = frozenset({"icc", "exif", "xmp"})
+PNG_STEP = 0.0254  # dots an inch: PNG tells whole dots a metre, and no 72
 HEADER = frozenset({"chromaticities", "texts", "attributes"})
 TABLE = (
     Format(
@@ -151,11 +152,13 @@ def unheld(
     *,
     with_layers: bool = True,
     with_margins: bool = True,
+    with_dpi: bool = True,
     animated: bool = False,
 ) -> str:
     """What of a picture the file `path` does not hold, in a sentence; "" if nothing.
 
     with_layers, with_margins: whether these were warped, as they are for a still that shows its own pixels.
+    with_dpi: whether its own resolution is written.
     animated: it holds all frames, unless it is one of a sequence.
     """
     own, kind = picture.chromaticities, FORMATS.get(Path(path).suffix.lower())
@@ -172,4 +175,15 @@ def unheld(
         losses.append(f"lacks the picture's overscan ({max(picture.margins)} px beyond the display window)")
     if picture.origin != (0, 0) and "origin" not in keeps:
         losses.append(f"begins at 0, 0 and not at {picture.origin[0]}, {picture.origin[1]} as the display window")
+    if picture.dpi and with_dpi and kind is not None and kind.name == "JPEG":
+        held = jpeg.held_dpi(picture.dpi)
+        if not np.allclose(held, picture.dpi, rtol=0, atol=PNG_STEP):
+            losses.append(
+                f"says {_dots(held)} dpi and not {_dots(picture.dpi)} as the picture: JPEG holds whole numbers"
+            )
     return f"{Path(path).name} {'; it '.join(losses)}" if losses else ""
+
+
+def _dots(dpi: tuple[float, float]) -> str:
+    """Dots an inch along x and y, or along both."""
+    return " x ".join(f"{value:g}" for value in dict.fromkeys(dpi))

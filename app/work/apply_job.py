@@ -157,7 +157,8 @@ class _Applying:
         steps = steps_for(self.size)
         self.progress.total = 2 * steps
         given, picture = self._map(self._files[0]), self.source.picture
-        self.notices.append(unheld(self.output, picture, with_margins=self._fits(given, picture)))
+        keeps_dpi = self.outputs.keeps_dpi
+        self.notices.append(unheld(self.output, picture, with_margins=self._fits(given, picture), with_dpi=keeps_dpi))
         self.progress.enter("")
         warped = self._warped(given, picture, lambda height: self.progress.parts(steps, height), alpha=True)
         self.progress.enter("writing")
@@ -209,6 +210,7 @@ class _Applying:
                 self.output,
                 self.source.picture,
                 animated=True,
+                with_dpi=outputs.keeps_dpi,
                 with_layers=is_own,
                 with_margins=is_own and self._fits(self._map(self._files[min(self._files)]), self.source.picture),
             )

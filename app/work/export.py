@@ -365,7 +365,7 @@ class _Export:
     @property
     def _along(self) -> dict[str, bool]:
         told = {"with_layers": self._has_layers, "with_margins": self._has_margins}
-        return told | {"animated": self.job.has_frames}
+        return told | {"with_dpi": self.outputs.keeps_dpi, "animated": self.job.has_frames}
 
     def _still(self, picture: Picture, parts: Callable[[int], Callable[[int], None]]) -> Picture:
         """A picture warped by the map as it is, with all that is written of it; for `parts` see `Progress`."""

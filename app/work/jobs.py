@@ -7,11 +7,13 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from math import isclose
 from pathlib import Path
 
 from app.errors import UserError
 from app.media.animation import AnimationOptions
 from app.media.clip import WHOLE, Clip, FrameRange, rate_of
+from app.media.codecs.jpeg import held_dpi
 from app.media.encoders import check_colours, check_output, is_animation
 from app.media.files import cannot_write, is_sequence, writable
 from app.media.formats import picture_format
@@ -85,6 +87,11 @@ class Outputs:
         return [path for path in (self.file, self.stats, self.maps and self.maps.path) if path is not None]
 
     @property
+    def keeps_dpi(self) -> bool:
+        """True if a picture's own resolution is written."""
+        return self.dpi is None and not self.strip
+
+    @property
     def is_animation(self) -> bool:
         return self.file is not None and (self.animated or is_animation(self.file))
 
@@ -107,7 +114,7 @@ class Outputs:
             raise UserError("--dpi is for a single picture, and none is written; leave it out")
         if "dpi" not in (form := picture_format(self.file)).keeps:
             raise UserError(f"{form.name} holds no resolution; leave out --dpi, or write a PNG, JPEG or TIFF")
-        if form.name == "JPEG" and not self.dpi.is_integer():
+        if form.name == "JPEG" and not isclose(held_dpi((self.dpi, self.dpi))[0], self.dpi):
             raise UserError(f"JPEG holds whole dots per inch, not {self.dpi:g}; round --dpi, or write a PNG or TIFF")
 
     def write(self, picture: Picture, quality: int) -> None:

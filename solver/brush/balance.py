@@ -45,11 +45,11 @@ class Balance:
 
     def _each_within(self, wanted: np.ndarray) -> np.ndarray:
         """The same, every push within its bound, however many lie on one another."""
-        found = solved(self._of_all, wanted)
+        found = self._solved(self._of_all, wanted)
         if self._over(found).max(initial=0.0) <= 1:
             return found
         wanted, shares = self._as_one(wanted), self._shares
-        found = solved(self._of_all, wanted)
+        found = self._solved(self._of_all, wanted)
         count, unknowns = self._influence.shape
         for _ in range(min(ROUNDS, MOST_WORK // max(count * count * unknowns, 1))):
             over = self._over(found)
@@ -58,7 +58,7 @@ class Balance:
             # What is too strong counts less, and the others make up for it: cut off, it would leave them unbalanced. At
             # rest on the bounds this is the constrained minimum; it ends as soon as all are within.
             shares = np.minimum(self._shares, shares / np.maximum(over, 1e-30))
-            found = solved(system(self._influence, self._soft, shares), wanted)
+            found = solved(self._influence, self._soft, wanted, shares)
         return found / max(self._over(found).max(), 1.0)
 
     def _over_together(self, found: np.ndarray) -> float:
@@ -83,9 +83,12 @@ class Balance:
         wanted, (rows, columns) = wanted.copy(), self._owners
         for owner in np.unique(rows):
             mine, own = rows == owner, columns == owner
-            alone = system(self._influence[np.ix_(mine, own)], self._soft[mine], self._shares[own])
-            wanted[mine] /= max(self._over(solved(alone, wanted[mine]), own).max(initial=0.0), 1.0)
+            alone = solved(self._influence[np.ix_(mine, own)], self._soft[mine], wanted[mine], self._shares[own])
+            wanted[mine] /= max(self._over(alone, own).max(initial=0.0), 1.0)
         return wanted
+
+    def _solved(self, matrix: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+        return self._shares * (np.linalg.solve(matrix, wanted) @ self._influence)
 
     def _over(self, found: np.ndarray, which: np.ndarray | slice = slice(None)) -> np.ndarray:
         """How many times its bound each of some unknowns is."""
@@ -95,15 +98,14 @@ class Balance:
         return over
 
 
-def system(influence: np.ndarray, soft: np.ndarray, shares: np.ndarray | float = 1.0) -> tuple[np.ndarray, np.ndarray]:
-    """W K' and K W K' + diag(soft) of (H3)."""
-    back = (shares * influence).T
-    matrix = influence @ back
+def system(influence: np.ndarray, soft: np.ndarray, shares: np.ndarray | float = 1.0) -> np.ndarray:
+    """K W K' + diag(soft) of (H3)."""
+    half = np.sqrt(shares) * influence
+    matrix = half @ half.T  # numpy computes one half of what is symmetric so
     matrix[np.diag_indices_from(matrix)] += soft
-    return back, matrix
+    return matrix
 
 
-def solved(both: tuple[np.ndarray, np.ndarray], wanted: np.ndarray) -> np.ndarray:
-    """The first of a `system` times the second's inverse times what is wanted."""
-    back, matrix = both
-    return back @ np.linalg.solve(matrix, wanted)
+def solved(influence: np.ndarray, soft: np.ndarray, wanted: np.ndarray, shares: np.ndarray | float = 1.0) -> np.ndarray:
+    """W K' times the inverse of `system`, times what is wanted."""
+    return shares * (np.linalg.solve(system(influence, soft, shares), wanted) @ influence)

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from solver.brush.balance import Balance, solved, system
+from solver.brush.balance import Balance, solved
 from solver.brush.brush import Brush
 from solver.brush.handle import Handle, Shape, area, spun, swelling
 from solver.brush.listed import draw_listed
@@ -185,7 +185,7 @@ class Handles:
         """Before a step at a time: find where the handles are and shall go, and add what the fluid lacks of that."""
         if not check_step(dt) > 0:
             raise ValueError("to lead a handle takes some time")
-        shapes = self._shapes
+        shapes, self._lead = self._shapes, None
         begun = np.array([each.is_in_picture and each.handle.start <= time + dt / 2 for each in shapes], bool)
         in_force = begun & np.array([time + dt / 2 < handle.end for handle in self.handles], bool)
         self._places = self._located()
@@ -194,7 +194,6 @@ class Handles:
             self._starts[new] = self._places[new]
         active, listed = np.flatnonzero(in_force).tolist(), np.flatnonzero(np.repeat(in_force, self._counts))
         if not active:
-            self._lead = None
             return
         radii, counts = self._radii[listed], self._counts[in_force]
         # A software rasteriser draws the strain while the processor finds the pushes: it is read after them.
@@ -226,12 +225,10 @@ class Handles:
         firm = np.where(is_led, np.maximum(slower, LEAST_STIFFNESS), 1.0)
         softs = self._soft[listed] + (1 / firm - 1) / self._stiffness[listed]
         soft = np.repeat(softs[pushed], 2)
-        if (
-            local_parts.any()
-        ):  # what is local is shared out first: the fluid would else do all of it, going on by itself
+        if local_parts.any():  # this is shared out first: the fluid would else do all of it, going on by itself
             local, part = pushes.local_influence(places)[:, :, : len(pushed)], local_parts[:, None]
             both = _matrix(((1 - part) * push[:, :, : len(pushed)] + part * local)[pushed])
-            carried = part * solved(system(both, soft), wanted[pushed].ravel()).reshape(-1, 2)
+            carried = part * solved(both, soft, wanted[pushed].ravel()).reshape(-1, 2)
             moved = np.einsum("iajb,jb->ia", local, carried)
             # At odds they drive one another on: together they carry a point no farther than one handle goes.
             over = max(float((np.hypot(*moved[pushed].T) / (FARTHEST_STEP * radii[pushed] / dt)).max()), 1.0)
@@ -256,7 +253,7 @@ class Handles:
 
     def carry(self) -> None:
         """After a step: let what is local carry the picture until the fluid's next one."""
-        fluid, lead = self._fluid, self._lead
+        fluid, lead, self._lead = self._fluid, self._lead, None  # of many points it is large
         if lead is None or not lead.local.any():
             return
         carry, viscosities = fluid.device.pass_("brush/handle_carry.frag"), self._probed(lead, fluid.faces())[:, 3]
@@ -496,8 +493,9 @@ class Handles:
     def _locality(self, numbers: np.ndarray) -> np.ndarray:
         """The local part of each of these points, or of what has begun beside it: it changes det J there too."""
         begun = np.flatnonzero(~np.isnan(self._starts[:, 0]))
-        apart = self._places[numbers, None] - self._places[begun]
-        meet = np.hypot(apart[..., 0], apart[..., 1]) < self._radii[numbers, None] + self._radii[begun]
+        here, there = self._places[numbers].T, self._places[begun].T
+        far = np.hypot(here[0][:, None] - there[0], here[1][:, None] - there[1])
+        meet = far < self._radii[numbers, None] + self._radii[begun]
         return np.where(meet, self._local[begun], 0.0).max(axis=1, initial=0.0)
 
     def _grown(self) -> float:
@@ -582,7 +580,8 @@ class Handles:
 
 def _beside(places: np.ndarray, radii: np.ndarray, handles: np.ndarray, led: np.ndarray) -> np.ndarray:
     """How much of others led too lies within reach, 0-1: 1 - product of 1 - (1 - q^2)^3, q in sums of radii."""
-    far = np.hypot(*(places[:, None] - places).transpose(2, 0, 1)) / (radii[:, None] + radii)
+    x, y = places.T
+    far = np.hypot(x[:, None] - x, y[:, None] - y) / (radii[:, None] + radii)
     near = np.maximum(1 - far**2, 0.0) ** 3 * (handles[:, None] != handles) * (led[:, None] & led)
     return 1 - (1 - near).prod(axis=1)
 
@@ -601,14 +600,17 @@ def _with_rings(places: np.ndarray, pushed: np.ndarray, push: np.ndarray, rings:
     """The matrix of what pushes do to what is pushed, with what they do to rings, and turns of rings to all."""
     if not rings:
         return _matrix(push[pushed])
-    turned = [_turned(places, ring) for ring in rings]
-    of_pushes = [spun(np.moveaxis(push[ring.rows] - push[ring.centre], (0, 1), (2, 3)), ring.arms) for ring in rings]
-    return np.block(
-        [
-            [_matrix(push[pushed]), np.stack([each[pushed].ravel() for each in turned], axis=-1)],
-            [np.stack(of_pushes).reshape(len(rings), -1), np.stack([_spins(each, rings) for each in turned], axis=-1)],
-        ]
-    )
+    rows, columns = 2 * len(pushed), 2 * push.shape[2]
+    found = np.empty((rows + len(rings), columns + len(rings)))
+    for row, number in enumerate(pushed):  # of many points it is large, and is copied but once
+        found[2 * row : 2 * row + 2, :columns] = push[number].reshape(2, columns)
+    for row, ring in enumerate(rings, rows):
+        across = np.moveaxis(push[ring.rows] - push[ring.centre], (0, 1), (2, 3))
+        found[row, :columns] = spun(across, ring.arms).ravel()
+    for column, ring in enumerate(rings, columns):
+        turned = _turned(places, ring)
+        found[:rows, column], found[rows:, column] = turned[pushed].ravel(), _spins(turned, rings)
+    return found
 
 
 def _turned(places: np.ndarray, ring: Ring) -> np.ndarray:

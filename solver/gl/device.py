@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import OrderedDict
+
 import moderngl
 import numpy as np
 
@@ -9,13 +11,17 @@ from solver.gl.context import Context
 from solver.gl.field import DoubleField, Field, FieldError
 from solver.gl.passes import Pass
 
+# Passes that are kept compiled. Painting with all tools asks for some 200, and a frame for 60. Mesa keeps the code of
+# each in memory, 1 to 15 MiB, and there are thousands of sets of defines.
+MOST_PASSES = 192
+
 
 class Device(Context):
     """One GL context and everything made in it."""
 
     def __init__(self, ctx: moderngl.Context, owns_context: bool = False) -> None:
         super().__init__(ctx, owns_context)
-        self._passes: dict[tuple[str, frozenset[tuple[str, object]]], Pass] = {}
+        self._passes: OrderedDict[tuple[str, frozenset[tuple[str, object]]], Pass] = OrderedDict()  # last used last
 
     def field(
         self,
@@ -47,8 +53,16 @@ class Device(Context):
         return field
 
     def pass_(self, shader: str, **defines: object) -> Pass:
-        """The pass of fragment shader `shader` (a path below `shaders/`), compiled once for each set of defines."""
+        """The pass of fragment shader `shader` (a path below `shaders/`), compiled once for each set of defines.
+
+        Of more than `MOST_PASSES` the least recently used is let go, and compiled again when it is wanted again.
+        """
         key = shader, frozenset(defines.items())
-        if key not in self._passes:
-            self._passes[key] = Pass(self, shader, defines)
-        return self._passes[key]
+        found = self._passes.get(key)
+        if found is None:
+            found = self._passes[key] = Pass(self, shader, defines)
+            if len(self._passes) > MOST_PASSES:
+                self._passes.popitem(last=False)
+        else:
+            self._passes.move_to_end(key)
+        return found

@@ -21,7 +21,9 @@ from app.media import files
 from app.media.codecs.cmyk import cmyk_to_rgb
 from app.media.codecs.exr import read_channels
 from app.media.depth import to_bits
+from app.media.encoders import check_output
 from app.media.ffmpeg import executable
+from app.media.formats import unheld
 from app.media.pictures import read_picture, write_picture
 from app.model.picture import Picture, linear_to_srgb, srgb_to_linear
 from app.work.jobs import Outputs
@@ -788,6 +790,19 @@ def test_names_that_cannot_be_written(tmp_path: Path):
     }.items():
         with pytest.raises(UserError, match=message):
             write_picture(tmp_path / name, picture)
+    for name, message in {
+        tmp_path / "a": "a picture's name must end in one of .* an animation's in",
+        tmp_path: "it is a folder; give the name of a file in it",
+        "/dev/null": "it is not an ordinary file; give another name",
+        tmp_path / "nowhere" / "a": "there is no folder",
+    }.items():
+        with pytest.raises(UserError, match=f"^Cannot write {name}: {message}"):
+            check_output(name)
+    reading, writing = os.pipe()
+    with pytest.raises(UserError, match="it is not an ordinary file; give another name"):
+        check_output(f"/dev/fd/{writing}")
+    os.close(reading)
+    os.close(writing)
     with pytest.raises(UserError, match="WebP holds no side longer than 16383; make it smaller"):
         write_picture(tmp_path / "a.webp", Picture(np.zeros((1, 17000, 3), np.uint8)))
     assert sorted(path.name for path in tmp_path.iterdir()) == ["device.png", "folder.png"]
@@ -927,10 +942,46 @@ def test_a_folder_that_takes_no_new_files_is_not_told_as_gone() -> None:
 
 
 def test_jpeg_is_not_asked_for_a_part_of_a_dot_per_inch(tmp_path: Path) -> None:
-    for dpi in (72.5, 72.0):
+    for dpi in (72.5, 71.12, 72.0):  # the second is 28 a centimetre
         outputs = Outputs(tmp_path / "a.jpg", dpi=dpi)
-        if dpi.is_integer():
+        if dpi != 72.5:
             outputs.check()
         else:
             with pytest.raises(UserError, match=r"JPEG holds whole dots per inch, not 72\.5"):
                 outputs.check()
+
+
+@pytest.mark.parametrize(
+    ("given", "held", "told"),
+    [
+        ((72.0, 72.0), (72.0, 72.0), ""),
+        ((72.009, 72.009), (72.0, 72.0), ""),  # as a PNG says 72
+        ((71.12, 142.24), (71.12, 142.24), ""),  # 28 and 56 a centimetre
+        ((72.5, 72.5), (72.0, 72.0), "a.jpg says 72 dpi and not 72.5 as the picture: JPEG holds whole numbers"),
+        ((50.8, 0.2), (51.0, 1.0), "a.jpg says 51 x 1 dpi and not 50.8 x 0.2 as the picture"),
+        ((254.0, 1e6), (254.0, 65535 * 2.54), "a.jpg says 254 x 166459 dpi and not 254 x 1e+06"),
+    ],
+)
+def test_a_jpeg_is_as_dense_as_the_picture_or_it_is_told(
+    tmp_path: Path, given: tuple[float, float], held: tuple[float, float], told: str
+) -> None:
+    path, picture = tmp_path / "a.jpg", Picture(smooth(3), dpi=given)
+    write_picture(path, picture)
+    with Image.open(path) as image:
+        assert image.info["dpi"] == pytest.approx(held, abs=1e-6)
+        np.testing.assert_allclose(np.asarray(image), smooth(3), atol=30)
+    assert unheld(path, picture).startswith(told)
+    assert bool(unheld(path, picture)) == bool(told)
+    assert not unheld(tmp_path / "a.tif", picture)
+    assert not unheld(path, picture, with_dpi=False)
+    assert unheld(path, read_picture(path)) == ""
+
+
+def test_dots_per_inch_that_are_no_number_are_none(tmp_path: Path) -> None:
+    Image.fromarray(smooth(3)).save(tmp_path / "a.tif", dpi=(72.0, 72.0))
+    whole = (tmp_path / "a.tif").read_bytes()
+    assert struct.pack("<II", 72, 1) in whole
+    for below in (0, 1):
+        data = whole.replace(struct.pack("<II", 72, 1), struct.pack("<II", 72, below))
+        (tmp_path / "b.tif").write_bytes(data)
+        assert (read_picture(tmp_path / "b.tif").dpi is None) == (below == 0)

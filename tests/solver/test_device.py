@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,8 @@ import pytest
 from PIL import Image
 
 from solver.gl.context import GPU, ContextError, NoSuchDevice
-from solver.gl.device import Device
+from solver.gl.device import MOST_PASSES, Device
+from solver.gl.passes import Pass
 from support.gl_objects import living
 
 ROOT = Path(__file__).parents[2]
@@ -205,3 +207,30 @@ def test_a_field_that_is_dropped_leaves_nothing_behind_and_a_list_needs_no_frame
     assert living(device, "Framebuffer") == {"Framebuffer": before["Framebuffer"] + 1}
     listed.release()
     assert living(device, *kinds) == before
+
+
+def test_of_many_passes_those_used_last_stay_compiled_and_the_others_are_compiled_again():
+    with Device.headless() as device:
+        field, source = device.field((2, 2)), device.upload(np.full((2, 2), 3, np.float32))
+
+        def copied(number: int) -> Pass:
+            field.clear()
+            copy = device.pass_("gl/copy.frag", NUMBER=number)
+            copy(field, field=source, offset=(0.0, 0.0))
+            assert (field.get() == 3).all()
+            return copy
+
+        first, held = copied(0), copied(1)
+        before = living(device, "Program", "Framebuffer", "VertexArray")
+        for number in range(2, MOST_PASSES):
+            copied(number)
+            assert copied(0) is first
+        full = living(device, *before)
+        assert full["Program"] == before["Program"] + MOST_PASSES - 2
+        for number in range(MOST_PASSES, 2 * MOST_PASSES):
+            copied(number)
+        assert living(device, *before) == full + Counter({"Program": 2, "VertexArray": 2})  # these two are held here
+        field.clear()
+        held(field, field=source, offset=(0.0, 0.0))
+        assert (field.get() == 3).all()
+        assert copied(0) is not first

@@ -6,7 +6,7 @@ import tracemalloc
 
 import numpy as np
 
-from solver import Device, Fluid, Grid, WarpMap
+from solver import Device, Fluid, Grid, Handle, Handles, WarpMap
 from solver.brush.brush import Brush
 from solver.brush.listed import draw_listed
 from solver.brush.push import Push
@@ -87,4 +87,27 @@ def test_each_of_several_pushes_slips_as_it_would_by_itself(device: Device):
         assert np.abs(one).max() > 0
         np.testing.assert_array_equal(one, other)
     for thing in (*brushes, warp, fluid, velocity):
+        thing.release()
+
+
+def test_many_led_points_take_little_more_than_their_matrix_and_leave_nothing(device: Device):
+    """Lines and points that are turned: what they do to each other is held once, and one copy to solve for it."""
+    handles = [
+        Handle((0.05 + 0.1 * k, 0.5), (0.5, 0.5), points=((0.05 + 0.1 * k, 0.1), (0.05 + 0.1 * k, 0.9)), radius=0.06)
+        for k in range(10)
+    ]
+    handles += [Handle((0.05 + 0.1 * k, 0.3), (0.5, 0.5), rotate=90, radius=0.06) for k in range(10)]
+    fluid = Fluid(device, Grid(32, 32))
+    warp = WarpMap(device, fluid.grid)
+    led = Handles(fluid, warp, handles)
+    led.advance(1 / 60)
+    pairs = 32 * sum(map(len, led.shapes)) ** 2  # bytes of a 2 x 2 matrix for each two points
+    assert pairs > 2**22
+    tracemalloc.start()
+    led.advance(1 / 60)
+    left, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert left < pairs / 4
+    assert most < 5.5 * pairs
+    for thing in (led, warp, fluid):
         thing.release()

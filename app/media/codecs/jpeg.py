@@ -14,6 +14,9 @@ from app.model.picture import Picture
 START_OF_SCAN, END, COMMENT = 0xDA, 0xD9, 0xFE
 APPLICATION = range(0xE0, 0xF0)
 MARKER = re.compile(rb"\xff[^\x00\xff\xd0-\xd7]")  # in a scan: neither a stuffed byte nor a restart
+# Of JFIF (ITU T.871, 10.1): where its unit is in a file, the units, dots an inch for one of each, and the most dots.
+UNIT_AT, INCH, CENTIMETRE, MOST_DOTS = 13, 1, 2, 0xFFFF
+INCHES = {INCH: 1.0, CENTIMETRE: 2.54}
 # What is kept, of the encoding or a thumbnail, or told as further pictures.
 UNDERSTOOD = ("JFIF", "JFXX", "Exif", "http://ns.adobe.com/xap/1.0/", "ICC_PROFILE", "MPF", "Adobe", "Ducky")
 
@@ -51,6 +54,28 @@ def write(path: Path, picture: Picture, quality: int) -> None:
     # Not optimized: that gains a few per cent, holds the file in memory once more, and fails where noise makes the
     # file larger than the buffer Pillow guesses.
     options: dict[str, Any] = {"subsampling": 0, "comment": picture.texts.get("Comment", "")}
+    unit = 0
     if picture.dpi:
-        options["dpi"] = tuple(round(value) for value in picture.dpi)
+        unit, *options["dpi"] = _density(picture.dpi)
     pillow.write("JPEG", path, picture, quality, **options)
+    if unit == CENTIMETRE:  # Pillow writes dots an inch only
+        with path.open("r+b") as file:
+            file.seek(UNIT_AT)
+            file.write(bytes([unit]))
+
+
+def held_dpi(dpi: tuple[float, float]) -> tuple[float, float]:
+    """Dots an inch along x and y as a JPEG tells them that is written of a picture with so many."""
+    unit, x, y = _density(dpi)
+    return x * INCHES[unit], y * INCHES[unit]
+
+
+def _density(dpi: tuple[float, float]) -> tuple[int, int, int]:
+    """The unit of JFIF, and whole dots of it along x and y: dots an inch, or a centimetre where that is nearer."""
+
+    def nearest(unit: int) -> tuple[float, tuple[int, int, int]]:
+        x, y = (min(max(round(value / INCHES[unit]), 1), MOST_DOTS) for value in dpi)
+        off = max(abs(x * INCHES[unit] - dpi[0]), abs(y * INCHES[unit] - dpi[1]))
+        return round(off, 6), (unit, x, y)
+
+    return min(nearest(INCH), nearest(CENTIMETRE))[1]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ RESOLUTION = {0x011A: 0, 0x011B: 0, 0x0128: 2}  # EXIF's codes of x, y and their
 
 def upright_dpi(dpi: Any, orientation: int) -> tuple[float, float] | None:
     """Pixels an inch along x and y of the upright picture, if they are told at all."""
-    if not dpi or len(dpi) != 2 or float(dpi[0]) <= 0 or float(dpi[1]) <= 0:
+    if not dpi or len(dpi) != 2 or not all(0 < float(value) < inf for value in dpi):
         return None
     x, y = float(dpi[0]), float(dpi[1])
     return (y, x) if orientation in (5, 6, 7, 8) else (x, y)
