@@ -6,9 +6,12 @@ import re
 
 MOST_SHOWN = 1000  # characters of a message
 
-# What a terminal obeys instead of showing it, or what changes the order of what is shown: control characters, line
-# separators, marks of direction, and the halves of characters that stand for bytes of names that are not UTF-8.
-_UNSHOWN = re.compile("[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufeff]")
+# What is obeyed instead of shown: control characters, line separators, and the halves of characters that stand for
+# bytes of names that are not UTF-8.
+_OBEYED = "\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff"
+_UNPRINTABLE = re.compile(f"[{_OBEYED}]")
+# A terminal also obeys marks of direction, which change the order of what is shown.
+_UNSHOWN = re.compile(f"[{_OBEYED}\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069\ufeff]")
 
 
 def shown(text: str) -> str:
@@ -22,8 +25,8 @@ def shown(text: str) -> str:
 
 
 def printable(name: str) -> str:
-    """The name of a file as a window takes it: bytes in it that are no UTF-8 become "?"."""
-    return name.encode("utf-8", "replace").decode()
+    """A name as a window takes it, in one line: control characters and bytes that are no UTF-8 become "?"."""
+    return _UNPRINTABLE.sub("?", name)
 
 
 class UserError(Exception):

@@ -204,7 +204,7 @@ def _packed(project: Project) -> tuple[Recipe, dict[str, bytes]]:
     files: dict[str, bytes] = {}
     new_names: dict[str, str] = {}
     for name in picture_names(project.recipe):
-        inside = printable(name if _is_plain(name) else Path(name).name)
+        inside = _text(name if _is_plain(name) else Path(name).name)
         while inside in files or inside in (RECIPE, FORMAT):
             inside = f"_{inside}"
         if name == project.recipe.picture:
@@ -229,9 +229,14 @@ def _referring(project: Project, path: Path) -> Recipe:
             mend = "put it back" if project.is_linked else "keep the picture in the project instead"
             raise UserError(f"Cannot refer to {target}: it is gone; {mend}")
         names[name] = name_from(path.resolve().parent, target)
-        if printable(names[name]) != names[name]:
+        if _text(names[name]) != names[name]:
             raise UserError(f"Cannot refer to {target}: its name is not text; keep the picture in the project instead")
     return Recipe.model_validate(_renamed(plain(project.recipe), names))
+
+
+def _text(name: str) -> str:
+    """The name of a file as it is stored: bytes in it that are no UTF-8 become "?"."""
+    return name.encode("utf-8", "replace").decode()
 
 
 def _is_plain(name: str) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from app.model.handles import RecipeHandle, RecipePin, heading
+from app.model.tools import TOOL
 from app.ui.messages import Messages
 from app.ui.workspace import Workspace
 from app.work.handle_status import FIT
@@ -54,8 +55,11 @@ class Cautions:
             return
         folds, places = session.folds
         if folds and not self._folds:
+            # Where Restore has made the fold, more of it need not help.
+            restored = session.document.history.undo_name == TOOL["restore"].label
+            mend = "Undo" if restored else "Undo, or Restore it there"
             self._messages.caution(
-                f"The warp folds over itself in {folds} of {places} places. Undo, or Restore it there.",
+                f"The warp folds over itself in {folds} of {places} places. {mend}.",
                 lambda: session is self._workspace.session and self._folds,
             )
         self._folds = folds > 0

@@ -12,6 +12,8 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import floor
 from pathlib import Path
+from typing import Any
+from weakref import WeakKeyDictionary
 
 import moderngl
 from imgui_bundle import imgui
@@ -59,6 +61,14 @@ class FileKind:
     name: str
     use: str
     variants: tuple[Variant, ...]
+
+
+# What the next export of the same work begins with, as it was chosen for the last; not the part of the time, which has
+# grown with the work.
+KEPT = (
+    "kind", "format", "variant", "size", "quality", "fps", "returns", "dissolve", "dpi", "filter", "finer", "forward",
+    "offsets",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -209,11 +219,14 @@ class ExportDialog(Dialog):
         self._end: float | None = None
         self.finer = 0
         self.folder = preferences.export_to
-        self.name = f"{session.project.name} warped"
-        self._named = self.name
         self._preview: ExportProcess | None = None
         self._image: moderngl.Texture | None = None
         self._folder: tempfile.TemporaryDirectory[str] | None = None
+        extent, chosen = exports.chosen.get(session, ((0, 0), {}))
+        if extent == (self.picture.width, self.picture.height):
+            vars(self).update(chosen)
+        self._named = self._proposed
+        self.name = chosen.get("name", self._named)
 
     @property
     def is_busy(self) -> bool:
@@ -472,11 +485,14 @@ class ExportDialog(Dialog):
 
     def _choose(self, kind: int) -> None:
         """Take another kind; a name that is still the one proposed goes with it."""
-        if kind != self.kind:
-            proposed = f"{self.session.project.name} {'map' if kind == MAP else 'warped'}"
-            self.name = proposed if self.name == self._named else self.name
-            self._named = proposed
         self.kind = kind
+        self.name = self._proposed if self.name == self._named else self.name
+        self._named = self._proposed
+
+    @property
+    def _proposed(self) -> str:
+        """The name of the file, unless the person gives it another."""
+        return f"{self.session.project.name} {'map' if self.kind == MAP else 'warped'}"
 
     def _ask_about_map(self, ui: Ui) -> None:
         self.forward = bool(ui.segmented("direction", ("To the original", "From the original"), int(self.forward), -1))
@@ -519,6 +535,9 @@ class ExportDialog(Dialog):
     def _start(self) -> None:
         self._exports.start(self.job())
         self._preferences.exported(self.output, self._told)
+        extent = self.picture.width, self.picture.height
+        kept = (*KEPT, "name") if self.name != self._named else KEPT
+        self._exports.chosen[self.session] = extent, {name: vars(self)[name] for name in kept}
 
     def _chosen(self, path: Path) -> None:
         name = printable(path.name)
@@ -573,10 +592,15 @@ class StillExporting(Dialog):
 
 
 class Exports:
-    """The export that is under way, if any."""
+    """The export that is under way, if any.
+
+    Attributes:
+        chosen: what was chosen for the last export of a work, and the size of its picture, pixels.
+    """
 
     def __init__(self, messages: Messages) -> None:
         self.messages = messages
+        self.chosen = WeakKeyDictionary[Session, tuple[tuple[int, int], dict[str, Any]]]()
         self.went_well = False  # the last one that has ended
         self._process: ExportProcess | None = None
         self._copied: tempfile.TemporaryDirectory[str] | None = None  # what is on its way to the clipboard

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from bisect import bisect_left
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -13,7 +12,7 @@ from app.errors import printable
 from app.ui import icons
 from app.ui.theme import packed
 from app.ui.viewport import Rect
-from app.ui.widgets import PANEL, Ui
+from app.ui.widgets import PANEL, Ui, fitting
 
 SECONDS = 5.0
 MOST = 3
@@ -103,7 +102,7 @@ class Messages:
         icons.draw(imgui.get_window_draw_list(), message.icon, corner.x, corner.y, ui.px(18), ink)
         room = width - ui.px(80)
         height = canvas.middle[1] - top - ui.px(24)
-        words = _fitting(message.text, room, height)
+        words = fitting(message.text, room, height)
         text = imgui.calc_text_size(words, wrap_width=room)
         imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + ui.px(28))
         imgui.begin_group()
@@ -126,15 +125,3 @@ class Messages:
         message.text = printable(message.text)
         self.shown = [*[other for other in self.shown if other.text != message.text][-(MOST - 1) :], message]
         self._changed()
-
-
-def _fitting(text: str, width: float, height: float) -> str:
-    """As much of a text as there is room for."""
-
-    def is_too_long(text: str) -> bool:
-        return imgui.calc_text_size(text, wrap_width=width).y > height
-
-    if not is_too_long(text):
-        return text
-    first = bisect_left(range(len(text)), True, key=lambda count: is_too_long(f"{text[:count]} ..."))
-    return f"{text[: max(first - 1, 1)]} ..."

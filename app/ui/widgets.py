@@ -5,6 +5,7 @@ One long class: each widget is a method of what it draws with, and there is noth
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, field
@@ -488,3 +489,15 @@ def keys_shown(chord: str) -> str:
     if chord.endswith("++"):
         return keys_shown(chord[:-2]) + "++"
     return "+".join(_NAMES.get(part, part.upper()) for part in chord.split("+")) if chord != "+" else chord
+
+
+def fitting(text: str, width: float, height: float) -> str:
+    """As much of a text as there is room for."""
+
+    def is_too_long(text: str) -> bool:
+        return imgui.calc_text_size(text, wrap_width=width).y > height
+
+    if not is_too_long(text):
+        return text
+    first = bisect_left(range(len(text)), True, key=lambda count: is_too_long(f"{text[:count]} ..."))
+    return f"{text[: max(first - 1, 1)]} ..."

@@ -22,7 +22,7 @@ import pytest
 import tifffile
 from PIL import Image
 
-from app.errors import MOST_SHOWN, UserError, shown
+from app.errors import MOST_SHOWN, UserError, printable, shown
 from app.media.inputs import open_input, read_input
 from app.media.maps import holds, read_map
 from app.media.pictures import read_picture, write_picture
@@ -594,6 +594,8 @@ def test_what_is_shown_is_one_line_that_no_terminal_obeys():
     assert shown("Grüße, 你好 👩‍🚀: \\") == "Grüße, 你好 👩‍🚀: \\"  # as it is
     assert shown("a\x1b[31m\n\t\r\0\x7f\x9b\u202e\u2028\udcff") == (r"a\x1b[31m\n\t\r\x00\x7f\x9b\u202e\u2028\udcff")
     assert str(UserError("\x1b]0;title\x07")) == r"\x1b]0;title\x07"
+    assert printable("Grüße, 你好 👩‍🚀 \u200eא: \\") == "Grüße, 你好 👩‍🚀 \u200eא: \\"  # as it is
+    assert printable("a\n\t\0\x1b\x7f\x9b\u2028\u2029\udcff b") == "a????????? b"
     long = str(UserError(f"Cannot read {'x' * 100_000}: there is no such file; check the name."))
     assert len(long) < MOST_SHOWN + 10
     assert re.fullmatch(r"Cannot read x+ \.\.\. x+: there is no such file; check the name\.", long)

@@ -119,6 +119,11 @@ def test_one_fold_of_the_warp_is_told_when_it_comes_up(robot: Robot, monkeypatch
         replay.warp.set(np.stack([height * bump, 0 * y], axis=-1).astype(np.float32))
         robot.frame(count=2)
         assert [message.text for message in messages.shown] == told
+    # Where Restore has just been used, it is not what helps.
+    robot.editor.session.document.history.commit("Restore", robot.editor.session.recipe.edited(amount=0.9))
+    replay.warp.set(np.stack([1.1 * bump, 0 * y], axis=-1).astype(np.float32))
+    robot.frame(count=2)
+    assert [message.text for message in messages.shown] == ["The warp folds over itself in 1 of 6912 places. Undo."]
 
 
 def test_the_newest_of_a_long_history_is_in_sight(robot: Robot) -> None:

@@ -27,6 +27,7 @@ from app.ui.panels import inspector
 from app.ui.preferences import Preferences
 from app.ui.widgets import Ui
 from app.work.export import run
+from app.work.jobs import Job
 from solver.gl.device import Device
 from support.commands import Run
 from support.editing import Robot, export_dialog
@@ -500,6 +501,53 @@ def test_the_next_export_begins_with_the_kind_of_the_last(robot: Robot, tmp_path
     assert (dialog.kind, dialog.ending) == (ANIMATION, ".webm")
     preferences.export_as = "Something of another version"
     assert ExportDialog(editor.session, editor.exports, editor.chooser, preferences).kind == PICTURE
+
+
+def test_the_next_export_of_a_work_begins_with_what_was_chosen_for_the_last(
+    robot: Robot, dialog: ExportDialog, widgets: Widgets, tmp_path: Path
+) -> None:
+    """After a loop it was no loop any more, and the file was replaced. The time goes to the end again."""
+    editor = robot.editor
+
+    def export(asked: ExportDialog) -> Job:
+        asked.folder = tmp_path
+        job = asked.job()
+        widgets.click("Export")
+        assert not editor.dialogs.shown, asked.problem
+        editor.exports.cancel()
+        robot.drag((0.4, 0.6), (0.5, 0.6), steps=6)
+        robot.rest()
+        return job
+
+    def ask() -> ExportDialog:
+        robot.key("ctrl+e")
+        robot.frame(count=3)
+        asked = editor.dialogs.shown[-1]
+        assert isinstance(asked, ExportDialog)
+        return asked
+
+    widgets.click("Loop")
+    dialog.size, dialog.quality, dialog.fps, dialog.name, dialog.start = 160, 70, 24, "sky", 0.1
+    first = export(dialog)
+    again = ask()
+    assert again.start == 0.0
+    second = export(again)
+    assert second.target == first.target == tmp_path / "sky.mp4"
+    assert second.recipe.output == first.recipe.output
+    assert second.recipe.time.ping_pong
+    # A name that was proposed is proposed anew: the work may have been given another.
+    third = ask()
+    widgets.click("Warp map")
+    third.name = f"{editor.session.project.name} map"
+    export(third)
+    editor.session.project = replace(editor.session.project, path=tmp_path / "called.fluidwarp")
+    fourth = ask()
+    assert (fourth.kind, fourth.name) == (MAP, "called map")
+    # Of another picture the size means something else.
+    robot.key("escape")
+    robot.frame(count=3)
+    editor.exports.chosen[editor.session] = (1, 1), {"size": 160}
+    assert ask().size == dialog.picture.width
 
 
 def test_of_linear_light_a_kind_is_proposed_that_holds_it(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -30,7 +30,7 @@ from app.ui.panels.hud import BEHIND
 from app.ui.preferences import Preferences
 from app.ui.saving import SaveDialog
 from app.ui.viewport import Rect
-from app.ui.widgets import Ui
+from app.ui.widgets import Ui, fitting
 from solver.gl.device import Device
 from solver.gl.passes import Pass
 from support.editing import BY_KEY, Robot, export_dialog, pattern, small_project
@@ -751,6 +751,20 @@ def test_the_inspector_comes_in_a_small_window(small: Robot) -> None:
     small.frame()
     assert small.editor.layout.inspector is None
     assert scaled(small, small.editor.layout.canvas).width >= min(wide, 200)
+
+
+def test_what_the_lanes_say_ends_in_dots_where_it_has_no_room(small: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And all of it is told where the pointer rests."""
+    whole, said, told = "Strokes become bars here: move them, stretch them, repeat them.", set[str](), set[str]()
+    monkeypatch.setattr("app.ui.panels.lanes.fitting", lambda *given: said.add(line := fitting(*given)) or line)
+    tooltip = Ui.tooltip
+    monkeypatch.setattr(Ui, "tooltip", lambda *given, more="", **kinds: told.add(more) or tooltip(*given, **kinds))
+    small.key("l")
+    small.frame(count=2)
+    is_cut = small.size[0] / small.editor.ui.scale < 600
+    assert any(line.endswith(" ...") for line in said) == is_cut
+    assert (whole in told) == is_cut
+    assert is_cut or said == {whole}
 
 
 BRUSH = {"radius", "hardness", "strength", "local"}  # of a push

@@ -30,6 +30,12 @@ def test_the_newest_messages_stay_and_none_stands_twice() -> None:
     assert len(heard) == MOST + 3
 
 
+def test_a_name_with_a_line_break_is_told_in_one_line() -> None:
+    messages = Messages(lambda: None)
+    messages.done("Exported two\nlines\t\udcff.png")
+    assert [message.text for message in messages.shown] == ["Exported two?lines??.png"]
+
+
 def test_what_does_not_hold_any_more_goes_at_once_and_a_caution_by_itself() -> None:
     messages, holds = Messages(lambda: None), [True]
     messages.warn("waits for somebody", lambda: holds[0])

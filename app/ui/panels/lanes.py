@@ -23,7 +23,7 @@ from app.ui.panels import timebar
 from app.ui.panels.timebar import FORCES, HANDLES, MASKS
 from app.ui.theme import packed, rgb
 from app.ui.viewport import Rect
-from app.ui.widgets import Ui
+from app.ui.widgets import Ui, fitting
 from app.work.session import Session
 
 ROW, GAP = 20.0, 3.0
@@ -121,12 +121,13 @@ def _head(ui: Ui, session: Session, state: EditorState, do: Do) -> None:
 
 
 def _words(ui: Ui, words: str, corner: ImVec2, room: float) -> None:
-    draw = imgui.get_window_draw_list()
     imgui.push_font(ui.fonts.regular, 13.5)
-    draw.push_clip_rect(corner, corner + ImVec2(room, ui.px(HEAD)), True)
-    draw.add_text(corner + ImVec2(0, ui.px(4)), packed(ui.palette.dim), words)
-    draw.pop_clip_rect()
+    line = fitting(words, room, imgui.get_text_line_height())
+    imgui.get_window_draw_list().add_text(corner + ImVec2(0, ui.px(4)), packed(ui.palette.dim), line)
     imgui.pop_font()
+    if line != words:
+        imgui.dummy(ImVec2(room, ui.px(HEAD - 4)))
+        ui.tooltip("All of it", more=words)
 
 
 def _told(session: Session, state: EditorState) -> str:
