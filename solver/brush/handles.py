@@ -230,8 +230,10 @@ class Handles:
             both = _matrix(((1 - part) * push[:, :, : len(pushed)] + part * local)[pushed])
             carried = part * solved(both, soft, wanted[pushed].ravel()).reshape(-1, 2)
             moved = np.einsum("iajb,jb->ia", local, carried)
-            # At odds they drive one another on: together they carry a point no farther than one handle goes.
-            over = max(float((np.hypot(*moved[pushed].T) / (FARTHEST_STEP * radii[pushed] / dt)).max()), 1.0)
+            # At odds they drive one another on. No push carries farther than one handle goes, nor do all together: of
+            # points that lie on one another they cancel there, and not beside them.
+            farthest = np.maximum(np.hypot(*moved[pushed].T), np.hypot(*carried.T))
+            over = max(float((farthest / (FARTHEST_STEP * radii[pushed] / dt)).max()), 1.0)
             carried, wanted = carried / over, wanted - moved / over
         centres = [ring.centre for ring in rings]
         soft, weights = np.concatenate([soft, softs[centres]]), np.concatenate([weights, np.ones(len(rings))])

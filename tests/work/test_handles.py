@@ -301,6 +301,8 @@ def test_a_map_that_only_slows_a_handle_down_does_not_keep_it_from_its_goal(devi
 
 SHORT = [[0.5954, 0.8611], [0.5953, 0.8612], [0.5953, 0.8611]]  # all its points lie on one another
 BESIDE = [[0.5364, 0.6153], [0.536, 0.6153], [0.5356, 0.6153], [0.536, 0.6153]]
+DICE = np.random.default_rng(20)
+ON_ONE_ANOTHER, APART = (0.5 + 0.001 * DICE.normal(size=(20, 2))).tolist(), DICE.uniform(0.1, 0.9, (20, 2)).tolist()
 TOO_STRONG = {
     "short lines that are opened, each in the other's way": (
         (96, 128),
@@ -318,6 +320,11 @@ TOO_STRONG = {
             {"points": [[0.95, 0.5], [0.57, 0.58], [0.75, 0.75], [0.8, 0.28]], "to": [0.96, 0.03], "rotate": -73.0}
             | {"radius": 1.0, "duration": 0.1}
         ],
+    ),
+    "points that lie on one another, led apart by local pushes": (
+        (64, 64),
+        [],
+        [{"points": ON_ONE_ANOTHER, "goals": APART, "local": 1.0, "radius": 0.1, "duration": 0.05}],
     ),
 }
 
