@@ -60,7 +60,8 @@ class EditorState:
     """What the tools, the panels and the keys set about the window.
 
     Attributes:
-        tool_name: the tool in pointer.
+        tool_name: the tool in hand.
+        tool_seen: the one that the strip was scrolled to last.
         brushes: of the tools for which something has been set, by their names.
         stabiliser: points of the screen, of the string that the pen pulls the brush by; 0 is none.
         preset_name: that has been typed for the brush, to keep it by.
@@ -92,6 +93,7 @@ class EditorState:
     """
 
     tool_name: str = "push"
+    tool_seen: str = ""
     brushes: dict[str, BrushSettings] = field(default_factory=dict)
     stabiliser: float = 0.0
     preset_name: str = ""

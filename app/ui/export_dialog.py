@@ -21,6 +21,7 @@ from imgui_bundle.imgui import ImVec2
 
 from app.errors import UserError, printable
 from app.media.clip import WHOLE, FrameRange, rate_of
+from app.media.encoders import written_size
 from app.media.formats import FORMATS
 from app.media.leftovers import temporary_folder
 from app.media.pictures import read_picture
@@ -38,7 +39,7 @@ from app.ui.units import SECONDS, Unit
 from app.ui.viewport import Rect
 from app.ui.widgets import Ui
 from app.work.export_process import ExportProcess
-from app.work.jobs import Job, MapOutput, Outputs
+from app.work.jobs import Job, MapOutput, Outputs, longer_side
 from app.work.session import Session
 from solver.gl.device import Device
 
@@ -382,6 +383,13 @@ class ExportDialog(Dialog):
         self._end = end
 
     @property
+    def written(self) -> tuple[int, int]:
+        """Width and height of what is written."""
+        own = self.picture.width, self.picture.height
+        size = longer_side(own, self.size)
+        return written_size(f"frames{self.ending}", size) if self.animation else size
+
+    @property
     def _holds_dpi(self) -> bool:
         return self.kind == PICTURE and "dpi" in FORMATS[self.ending].keeps
 
@@ -404,9 +412,9 @@ class ExportDialog(Dialog):
         if len(variants := self.file_kind.variants) > 1:
             labels, now = [variant.label for variant in variants], self.variant[self.kind][chosen]
             self.variant[self.kind][chosen] = ui.segmented("variant", labels, now, -1)
-        ui.dim(self.use)
+        ui.wrapped(self.use, ui.palette.dim, 13)
         own = max(self.picture.width, self.picture.height)
-        width, height = (round(side * self.size / own) for side in (self.picture.width, self.picture.height))
+        width, height = self.written
         unit, shown = Unit(" pixels", self.picture.width / own), f"{width} x {height} pixels"
         slid = ui.slider("size", "Size", self.size, 16, max(own * 2, 64), unit, own, shown)
         self.size = round(slid.value)
@@ -453,11 +461,13 @@ class ExportDialog(Dialog):
             else:
                 kept = [word for word, has in (("sound", clip.sound), ("time code", clip.timecode)) if has]
                 pace = f"{float(self._rate):.5g} frames a second" if clip.durations is None else "own pace"
-                ui.dim(f"The clip warped, at its {pace}{', with its ' * bool(kept)}{' and '.join(kept)}.")
+                about = f"The clip warped, at its {pace}{', with its ' * bool(kept)}{' and '.join(kept)}."
+                ui.wrapped(about, ui.palette.dim, 13)
         ui.dim("Simulate on the grid")
         self.finer = ui.segmented("finer", [label for label, _ in FINER], self.finer, -1)
         if self.finer and self.kind != MAP:
-            ui.dim("Finer detail, longer work; it may look a little different from what you see.")
+            more = "Finer detail, longer work; it may look a little different from what you see."
+            ui.wrapped(more, ui.palette.dim, 13)
             self._show_preview(ui)
         imgui.dummy(ImVec2(0, ui.px(2)))
         ui.dim("File")
@@ -466,7 +476,7 @@ class ExportDialog(Dialog):
         imgui.same_line()
         if ui.button("Browse", width=96, height=27):
             self._chooser.ask_where("Export to", self.output, (self.ending,), self._chosen)
-        ui.dim(str(self.output))
+        ui.wrapped(str(self.output), ui.palette.dim, 13)
         if os.path.exists(self.output):
             ui.text("This file exists and will be replaced.", ui.palette.accent, 13)
         imgui.dummy(ImVec2(0, ui.px(6)))
@@ -496,10 +506,12 @@ class ExportDialog(Dialog):
 
     def _ask_about_map(self, ui: Ui) -> None:
         self.forward = bool(ui.segmented("direction", ("To the original", "From the original"), int(self.forward), -1))
-        ui.dim(
+        ui.wrapped(
             "For each pixel of the original, where it goes."
             if self.forward
-            else "For each pixel of the result, where it is looked up: what other programs apply."
+            else "For each pixel of the result, where it is looked up: what other programs apply.",
+            ui.palette.dim,
+            13,
         )
         if self.ending in (".exr", ".tif"):
             self.offsets = bool(ui.segmented("values", ("ST map, 0 to 1", "Offsets in pixels"), int(self.offsets), -1))

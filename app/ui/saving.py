@@ -71,7 +71,7 @@ class SaveDialog(Dialog):
         imgui.same_line()
         if ui.button("Browse", width=96, height=27):
             self._chooser.ask_where("Save", self.path, (SUFFIX,), self._chosen)
-        ui.dim(str(self.path))
+        ui.wrapped(str(self.path), ui.palette.dim, 13)
         if os.path.exists(self.path) and self.path != self._own:
             ui.text("This file exists and will be replaced.", ui.palette.accent, 13)
         imgui.dummy(ImVec2(0, ui.px(2)))

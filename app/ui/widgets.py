@@ -99,14 +99,28 @@ class Ui:
 
     @contextmanager
     def floating(
-        self, name: str, x: float, y: float, pivot: tuple[float, float], alpha: float = 0.94, clicked: bool = True
+        self,
+        name: str,
+        x: float,
+        y: float,
+        pivot: tuple[float, float],
+        alpha: float = 0.94,
+        clicked: bool = True,
+        tallest: float = 0.0,
     ) -> Iterator[None]:
-        """A small panel that lies on the canvas and is as large as what is in it; the pointer may go through it."""
+        """A small panel that lies on the canvas and is as large as what is in it; the pointer may go through it.
+
+        `tallest`: it scrolls where it would be higher than that, in points of the screen; 0 if it never does.
+        """
         imgui.set_next_window_pos(ImVec2(x, y), imgui.Cond_.always, ImVec2(*pivot))
         imgui.set_next_window_bg_alpha(alpha)
         imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(self.px(6), self.px(4)))
         imgui.push_style_var(imgui.StyleVar_.window_rounding, self.px(8))
-        imgui.begin(name, None, FLOATING | (0 if clicked else int(imgui.WindowFlags_.no_inputs)))
+        flags = FLOATING | (0 if clicked else int(imgui.WindowFlags_.no_inputs))
+        if tallest:
+            imgui.set_next_window_size_constraints(ImVec2(0, 0), ImVec2(imgui.FLT_MAX, max(tallest, 1.0)))
+            flags &= ~int(imgui.WindowFlags_.no_scrollbar)
+        imgui.begin(name, None, flags)
         imgui.pop_style_var(2)
         try:
             yield

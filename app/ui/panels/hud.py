@@ -20,6 +20,7 @@ from app.ui.workspace import Workspace
 from app.work.session import Session
 
 ZOOM, HINT = 160.0, 260.0  # points of the canvas's width that what lies on it needs
+LOW = 160.0  # and of its height up to which hints would lie over what they are about
 LEGEND = ((-1, "0.1x"), (0, "1x"), (1, "10x"), (2, "100x"), (3, "1000x"))
 """Decades of viscosity, and what they are called; their tints are those of canvas.frag."""
 THICK, THIN, GREY = (0.80, 0.30, 0.62, 1.0), (0.34, 0.71, 0.91, 1.0), (0.5, 0.5, 0.5, 1.0)
@@ -45,11 +46,13 @@ def draw(
         how = "Drag a point to where it should go. Click to pin one where it is."
     elif state.tool_name == "freeze" and not _has_frozen(session.recipe):
         how = "What is frozen holds back the fluid beside it: leave some space to what you push."
-    if how and not is_covered and canvas.width > ui.px(HINT):
+    has_room = canvas.width > ui.px(HINT) and canvas.height > ui.px(LOW)
+    has_legend = state.shows_viscosity and not state.before and canvas.width > ui.px(HINT)
+    if how and not is_covered and has_room:
         _how(ui, canvas, how)
-    elif preferences.hint and not how and canvas.width > ui.px(HINT):
+    elif preferences.hint and not how and has_room and not has_legend and not state.statistics:
         _hint(ui, canvas, preferences)
-    if state.shows_viscosity and not state.before and canvas.width > ui.px(HINT):
+    if has_legend:
         _legend(ui, canvas, state.overlays["viscosity"].opacity)
     if state.statistics:
         _statistics(ui, canvas, session, numbers, clock)
@@ -108,7 +111,9 @@ def _legend(ui: Ui, canvas: Rect, opacity: float) -> None:
 
 def _how(ui: Ui, canvas: Rect, words: str) -> None:
     with ui.floating("how", canvas.x + canvas.width / 2, canvas.y + ui.px(14), (0.5, 0), 0.9, clicked=False):
+        imgui.push_text_wrap_pos(canvas.width - ui.px(24))
         ui.text(f"  {words}  ", size=14)
+        imgui.pop_text_wrap_pos()
 
 
 def _hint(ui: Ui, canvas: Rect, preferences: Preferences) -> None:
@@ -132,7 +137,8 @@ def _hint(ui: Ui, canvas: Rect, preferences: Preferences) -> None:
 
 def _statistics(ui: Ui, canvas: Rect, session: Session, numbers: Numbers, clock: Clock) -> None:
     stats = numbers.take(session)
-    with ui.floating("statistics", canvas.x + ui.px(12), canvas.y + ui.px(12), (0, 0), 0.85):
+    tallest = canvas.height - ui.px(12 + 54)  # above the zoom
+    with ui.floating("statistics", canvas.x + ui.px(12), canvas.y + ui.px(12), (0, 0), 0.85, tallest=tallest):
         spent = clock.milliseconds
         ui.text(f"Frame  {spent.get('frame', 0):.1f} ms", size=13)
         for name in ("simulate", "canvas", "panels", "interface"):

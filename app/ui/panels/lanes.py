@@ -29,7 +29,7 @@ from app.work.session import Session
 ROW, GAP = 20.0, 3.0
 HEAD, RULER = 30.0, 18.0
 LOW = 100.0  # points of height up to which there is no ruler
-EDGE = 6.0  # points of the upper edge that can be taken hold of
+EDGE = 4.0  # points of the upper edge that can be taken hold of
 GRIP = 6.0  # points at a bar's ends by which it is stretched
 NARROWEST = 9.0  # points of a bar
 SHAKE = 3.0  # points that the pointer may move and is not dragging yet
@@ -191,7 +191,7 @@ def _bars(ui: Ui, session: Session, state: EditorState, scale: Scale) -> bool:
     corner, row = imgui.get_cursor_screen_pos(), ui.px(ROW + GAP)
     room = imgui.get_content_region_avail().y
     height = max(len(packed_lanes) * row + ui.px(GAP), room)
-    imgui.invisible_button("bars", ImVec2(max(scale.x1 - corner.x + ui.px(6), 1.0), height))
+    imgui.invisible_button("bars", ImVec2(max(imgui.get_content_region_avail().x, 1.0), height))
     let_go = _point(ui, session, state, scale)
     draw = imgui.get_window_draw_list()
     top = imgui.get_window_pos().y

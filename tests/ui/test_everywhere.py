@@ -1,0 +1,163 @@
+"""From the smallest window to the largest screen, at every size of the interface: nothing is cut off."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from app.model.handles import RecipeHandle, RecipePin
+from app.model.strokes import Stroke, ToolName
+from app.model.tools import TOOLS
+from app.ui.actions import ACTIONS
+from app.ui.browser import Browser
+from app.ui.dialogs import Dialog, PictureOrMap, Preferring, Unsaved
+from app.ui.editor_state import SELECT_BY
+from app.ui.export_dialog import KINDS, ExportDialog
+from app.ui.key_sheet import KeySheet
+from app.ui.preferences import Preferences
+from app.ui.saving import SaveDialog
+from solver.gl.device import Device
+from support.editing import Robot, add_bars, small_project
+from support.laid import Laid
+
+SIZES = ((800, 520), (1280, 800), (3840, 2160))
+
+
+def tools(robot: Robot, places: object) -> Iterator[str]:
+    """Each with what can be set about it, in the bar and behind its last button."""
+    state = robot.editor.state
+    robot.editor.preferences.hint = True
+    yield "start"
+    for tool in TOOLS:
+        for shown in (False, True):
+            state.lanes.shown = shown
+            state.choose_tool(tool.name, False)
+            yield f"{tool.name}{', lanes' * shown}"
+    state.lanes.shown = False
+    for way in SELECT_BY:
+        state.choose_tool("select", False)
+        state.select_by = way
+        yield f"select by {way}"
+    state.choose_tool("push", False)
+    state.statistics = True
+    yield "statistics"
+
+
+def time(robot: Robot, places: object) -> Iterator[str]:
+    """The timeline, its bars and all of the inspector."""
+    editor, state, session = robot.editor, robot.editor.state, robot.editor.session
+    state.lanes.shown = state.inspector = state.over_narrow = True
+    yield "no bars yet"
+    ways: tuple[tuple[ToolName, float], ...] = ("push", 0.3), ("twirl", 0.6), ("bloat", 0.5), ("freeze", 0.8)
+    strokes = tuple(
+        Stroke(tool=tool, samples=((15 * k, x, 0.5, 1.0), (15 * k + 12, x + 0.1, 0.4, 1.0)))
+        for k, (tool, x) in enumerate(ways)
+    )
+    led = RecipeHandle(at=(0.4, 0.5), to=(0.5, 0.45), duration=0.1, start=0.05)
+    line = RecipeHandle(points=((0.2, 0.8), (0.35, 0.85), (0.5, 0.8)), at=(0.35, 0.8), to=(0.4, 0.7), duration=0.1)
+    parts = {"handle": (led, line), "pin": (RecipePin(at=(0.7, 0.3)),)}
+    session.edit("Strokes, handles and a pin with a long name", stroke=strokes, duration=2.0, **parts)
+    add_bars(session)
+    session.seek(session.end // 2)
+    session.settle()
+    editor.messages.shown.clear()
+    yield "bars"
+    for which in (("stroke", 1), ("force", 0), ("force", 1), ("handle", 0), ("pin", 0)):
+        state.lanes.selected = {which}
+        yield f"{which} is selected"
+    state.lanes.selected = {("stroke", 0), ("stroke", 1)}
+    yield "several are selected"
+    state.lanes.selected = set()
+    robot.key("g")
+    for label in ("", "handle[1]", "handle[2]", "pin[1]"):
+        state.selected = label
+        yield f"the handle {label!r}"
+    robot.key("f")
+    state.sections = dict.fromkeys(("fluid", "symmetry", "view", "quality", "masks", "history", "numbers"), True)
+    state.symmetry, state.split = "radial", 0.4
+    for overlay in state.overlays.values():
+        overlay.shown = True
+    yield "all sections"
+    state.mask = "thickness"
+    yield "of the other mask"
+    state.lanes.shown = False
+    yield "without lanes"
+    editor.preferences.names = True
+    yield "names beside the tools"
+
+
+def over(robot: Robot, places: dict[str, tuple[float, float]]) -> Iterator[str]:
+    """What opens over the window, and what tells of work under way."""
+    editor = robot.editor
+    likes, scale, do = editor.preferences, editor.ui.scale, lambda *_: None
+    likes.presets["My own"] = {"radius": 0.05, "hardness": 1.0, "strength": 0.5}
+    likes.recent = ["/somewhere/a.png", "/elsewhere/b.fluidwarp"]
+    robot.click(24 * scale, 24 * scale)
+    yield "the menu"
+    robot.key("escape")
+    for tool in ("push", "twirl", "handle", "thicken"):
+        editor.state.choose_tool(tool, False)
+        robot.frame(count=2)
+        robot.click(*places["more"])
+        yield f"more about {tool}"
+        robot.key("escape")
+        robot.frame(count=2)
+    robot.key("ctrl+e")
+    asked = editor.dialogs.shown[-1]
+    assert isinstance(asked, ExportDialog)
+    for kind, (label, files) in enumerate(KINDS):
+        asked.kind = kind
+        for number, file in enumerate(files):
+            asked.format[kind], asked.finer = number, number % 2
+            yield f"export {label} {file.name}"
+    yield from ended(robot, asked)
+    project = editor.session.project
+    keys = KeySheet(editor.keys)
+    for dialog in (
+        Unsaved(editor.workspace, "quit", do, do),
+        PictureOrMap("a picture with a long name, or a map.exr", do, do),
+        SaveDialog(project, Path("folder/a.fluidwarp"), Preferences(), editor.chooser, do, None),
+        Browser("Open", Path(__file__).parent, (".py",), do),
+        Browser("Save the mask", Path(__file__).parent, (".py",), do, "mask.png"),
+        Preferring(likes, editor.state),
+        keys,
+    ):
+        editor.dialogs.show(dialog)
+        yield dialog.title
+        if dialog is keys:
+            keys.choose(ACTIONS["export"])
+            yield "a key is wanted"
+            keys.hear("ctrl+s")
+            yield "a key that is taken"
+        yield from ended(robot, dialog)
+
+
+def ended(robot: Robot, dialog: Dialog) -> Iterator[str]:
+    dialog.problem = "Cannot write a.png: there is no room left on the disk; make some, or choose another folder."
+    yield f"{dialog.title}: a problem"
+    dialog.close()
+    robot.frame(count=2)
+
+
+TOURS = (tools, time, over)
+
+
+@pytest.mark.parametrize("tour", TOURS, ids=lambda tour: tour.__name__)
+@pytest.mark.parametrize("scale", [1.0, 1.5, 2.0], ids=lambda scale: f"{scale:.0%}")
+@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
+def test_nothing_is_cut_off_or_over_something_else(
+    device: Device, tmp_path: Path, size: tuple[int, int], scale: float, tour: object, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    likes = Preferences(auto_quality=False, scale=scale)
+    laid, told = Laid(monkeypatch), dict[str, str]()
+    with Robot(device, small_project(tmp_path), size, preferences=likes) as robot:
+        for state in tour(robot, laid.places):  # pyright: ignore[reportCallIssue]
+            robot.move(size[0] / 2, size[1] / 2)
+            robot.frame(count=2)
+            laid.faults()
+            robot.frame()
+            for fault in laid.faults():
+                told.setdefault(fault, state)
+    assert not told, "\n".join(f"{state}: {fault}" for fault, state in told.items())
