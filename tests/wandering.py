@@ -398,7 +398,9 @@ class Sitting:
             far = dist(
                 *([x * side for x, side in zip(one[:2], told["extent"], strict=True)] for one in (before, sample))
             )
-            arrives, before = max(tick - pen, arrives + far / reach), sample
+            # Until the tick before the one in which it was heard the brush stood where it was.
+            leaves = max(arrives, tick - pen - 1)
+            arrives, before = max(tick - pen, leaves + far / reach), sample
             if not tick - pen <= sample[2] - first <= arrives + 1:
                 raise Fault(f"{sample} is not of tick {first + arrives:.2f}: {told}, {samples}")
             if moment < sent or (tick - pen) * dt > clock - began + 2.7 * dt:
