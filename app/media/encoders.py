@@ -285,6 +285,13 @@ def unheld_of_clip(
     return lost(clip.path, losses)
 
 
+def written_size(path: str | os.PathLike[str], size: tuple[int, int]) -> tuple[int, int]:
+    """The width and height with which an animation's frames are written: some formats have no odd sides."""
+    container = None if is_sequence(path) else ANIMATIONS.get(Path(path).suffix.lower())
+    width, height = size
+    return (width + width % 2, height + height % 2) if container is not None and container.even else size
+
+
 def check_colours(path: str | os.PathLike[str], codec: str | None, clip: Clip, animated: bool) -> None:
     """Raise `UserError` if a file cannot tell what a clip's colours are, or has too few bits for their range."""
     if clip.colours.is_usual:

@@ -265,10 +265,12 @@ class Files:
         """What is being read, with a button to give it up."""
         if self._loading is None:
             return
+        session = self.workspace.session
+        is_sample = session is self.workspace.placeholder and not session.has_begun
         with ui.floating("loading", canvas.x + canvas.width / 2, canvas.y + ui.px(16), (0.5, 0)):
             imgui.begin_group()
             ui.text(f"Opening {self._loading.name} ...", size=14)
-            ui.dim("You can go on meanwhile.")
+            ui.dim("The picture below is a sample." if is_sample else "You can go on meanwhile.")
             imgui.end_group()
             imgui.same_line(0, ui.px(16))
             if ui.button("Cancel##loading", height=30):

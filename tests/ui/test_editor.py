@@ -42,6 +42,7 @@ from app.ui.numbers import Numbers
 from app.ui.preferences import Preferences
 from app.ui.quality import GRIDS, PATIENCE, TRIALS, Speed
 from app.ui.saving import SaveDialog
+from app.ui.widgets import Ui
 from app.work.export import run
 from app.work.jobs import Job, MapOutput, Outputs
 from solver.brush.masks import ZERO
@@ -1189,6 +1190,29 @@ def test_a_file_is_read_in_the_background(robot: Robot, tmp_path: Path) -> None:
     assert robot.editor.canvas.size == (100, 60)
     robot.key("ctrl+z")
     assert names(robot) == ["Open", "Push"]
+
+
+def test_while_a_file_is_read_the_picture_that_is_only_there_until_then_is_called_a_sample(
+    robot: Robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    goes_on, said, dim = Event(), list[str](), Ui.dim
+    monkeypatch.setattr(Ui, "dim", lambda ui, text, *more: said.append(text) or dim(ui, text, *more))
+
+    def load() -> Project:
+        assert goes_on.wait(60)
+        return load_any(tmp_path / "pattern.png")
+
+    robot.editor.workspace.placeholder = robot.editor.session
+    robot.editor.files.read(tmp_path / "pattern.png", load)
+    robot.frame()
+    assert "The picture below is a sample." in said
+    said.clear()
+    robot.drag((0.4, 0.5), (0.55, 0.5))  # it is somebody's work now
+    robot.frame()
+    goes_on.set()
+    assert said
+    assert "You can go on meanwhile." in said[-40:]
+    robot.until(lambda: not robot.editor.files.is_loading)
 
 
 def test_what_was_read_for_long_is_seen_without_anybody_s_hand(robot: Robot, tmp_path: Path) -> None:

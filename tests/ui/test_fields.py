@@ -7,6 +7,7 @@ from inspect import signature
 from pathlib import Path
 from typing import Any
 
+import imageio.v3 as iio
 import numpy as np
 import pytest
 from imgui_bundle import imgui
@@ -548,6 +549,28 @@ def test_the_next_export_of_a_work_begins_with_what_was_chosen_for_the_last(
     robot.frame(count=3)
     editor.exports.chosen[editor.session] = (1, 1), {"size": 160}
     assert ask().size == dialog.picture.width
+
+
+@pytest.mark.parametrize("ending", [".mp4", ".mkv", ".gif", ".%04d.png"])
+def test_the_size_that_is_told_of_an_animation_is_the_one_that_is_written(
+    device: Device, dialog: ExportDialog, tmp_path: Path, ending: str
+) -> None:
+    """Some kinds of file have no odd sides: their last pixels are repeated."""
+    dialog.kind, dialog.folder, dialog.name, dialog.size, dialog.fps, dialog.end = (
+        ANIMATION,
+        tmp_path,
+        "a",
+        61,
+        10.0,
+        0.2,
+    )
+    dialog.format[ANIMATION] = next(
+        n for n, file in enumerate(KINDS[ANIMATION][1]) if file.variants[0].ending == ending
+    )
+    run(device, dialog.job(), Progress())
+    file = next(tmp_path.glob(f"a*{Path(ending).suffix}"))
+    assert iio.imread(file, index=0).shape[1::-1] == dialog.written
+    assert (dialog.written == (61, 46)) == (ending != ".mp4")
 
 
 def test_of_linear_light_a_kind_is_proposed_that_holds_it(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
