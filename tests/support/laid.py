@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
@@ -38,7 +39,7 @@ class Thing:
 
 
 class Laid:
-    """Notes what is laid out from now on.
+    """Notes what is laid out in the frames that are looked at.
 
     Args:
         monkeypatch: of the test, at whose end nothing is noted any more.
@@ -49,6 +50,7 @@ class Laid:
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.things: list[Thing] = []
+        self._looks = False
         self.places: dict[str, tuple[float, float]] = {}
         for name in CLICKED:
             self._note(monkeypatch, name, is_words=False)
@@ -57,6 +59,8 @@ class Laid:
 
         def writing(lines: imgui.ImDrawList, at: Any, *given: Any) -> None:
             drawn(lines, at, *given)
+            if not self._looks:
+                return
             window = internal.get_current_window()
             # What is written on the canvas itself, beside handles, may be cut off by its edge as the picture is.
             if isinstance(at, imgui.ImVec2) and not window.is_fallback_window:
@@ -73,6 +77,8 @@ class Laid:
         drawn = getattr(imgui, kind)
 
         def noting(name: str, *given: Any, **named: Any) -> Any:
+            if not self._looks:
+                return drawn(name, *given, **named)
             within = _chain(internal.get_current_window())
             said = drawn(name, *given, **named)
             if kind != "begin_menu" or said is not True:
@@ -82,8 +88,11 @@ class Laid:
 
         monkeypatch.setattr(imgui, kind, noting)
 
-    def faults(self) -> list[str]:
-        """What is cut off, beyond reach, or over something else, of what was noted since the last time."""
+    def faults(self, frame: Callable[[], None]) -> list[str]:
+        """What is cut off, beyond reach, or over something else, in a frame that is drawn now."""
+        self._looks = True
+        frame()
+        self._looks = False
         things, self.things = [thing for thing in self.things if not thing.is_hidden], []
         display = imgui.get_io().display_size
         screen = Rect(0, 0, display.x, display.y)
@@ -92,11 +101,7 @@ class Laid:
         for thing in things:
             by_window.setdefault(thing.within[0].id_, []).append(thing)
         for several in by_window.values():
-            told += [
-                f"{one.window}: {one.name!r} lies over {other.name!r}"
-                for one, other in combinations(several, 2)
-                if _collide(one, other)
-            ]
+            told += [f"{one.window}: {one.name!r} lies over {other.name!r}" for one, other in _collisions(several)]
         roots = {thing.within[-1].id_: thing.within[-1] for thing in things}.values()
         floating = [root for root in roots if root.name in CANVAS]
         told += [
@@ -135,10 +140,18 @@ def _sticks_out(rect: Rect, inside: Rect, down: bool) -> bool:
     return across or (down and (rect.y < inside.y - NEAR or rect.bottom > inside.bottom + NEAR))
 
 
-def _collide(one: Thing, other: Thing) -> bool:
-    a, b = _seen(one), _seen(other)
-    if not _overlap(a, b):
-        return False
+def _collisions(things: list[Thing]) -> Iterator[tuple[Thing, Thing]]:
+    """Those that lie over each other, of things of one window; from the top down, so that few have to be compared."""
+    placed = sorted(((_seen(thing), thing) for thing in things), key=lambda pair: pair[0].y)
+    for number, (a, one) in enumerate(placed):
+        for b, other in placed[number + 1 :]:
+            if b.y > a.bottom:
+                break
+            if _overlap(a, b) and _collide(one, other, a, b):
+                yield one, other
+
+
+def _collide(one: Thing, other: Thing, a: Rect, b: Rect) -> bool:
     if one.is_words and other.is_words:
         return True
     if one.is_words or other.is_words:

@@ -156,8 +156,6 @@ def test_nothing_is_cut_off_or_over_something_else(
         for state in tour(robot, laid.places):  # pyright: ignore[reportCallIssue]
             robot.move(size[0] / 2, size[1] / 2)
             robot.frame(count=2)
-            laid.faults()
-            robot.frame()
-            for fault in laid.faults():
+            for fault in laid.faults(robot.frame):
                 told.setdefault(fault, state)
     assert not told, "\n".join(f"{state}: {fault}" for fault, state in told.items())
