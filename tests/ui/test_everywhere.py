@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from app.model.bars import Which
 from app.model.handles import RecipeHandle, RecipePin
 from app.model.strokes import Stroke, ToolName
 from app.model.tools import TOOLS
@@ -64,7 +65,8 @@ def time(robot: Robot, places: object) -> Iterator[str]:
     session.settle()
     editor.messages.shown.clear()
     yield "bars"
-    for which in (("stroke", 1), ("force", 0), ("force", 1), ("handle", 0), ("pin", 0)):
+    those: tuple[Which, ...] = ("stroke", 1), ("force", 0), ("force", 1), ("handle", 0), ("pin", 0)
+    for which in those:
         state.lanes.selected = {which}
         yield f"{which} is selected"
     state.lanes.selected = {("stroke", 0), ("stroke", 1)}
