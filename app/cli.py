@@ -162,7 +162,7 @@ Cluster = Annotated[
 ]
 Dpi = Annotated[
     float | None,
-    typer.Option(min=1, max=10_000, help="Dots per inch to note in a PNG, JPEG or TIFF. Default: the picture's."),
+    typer.Option(min=1, max=10_000, help="Dots per inch to note in a picture for print. Default: its own."),
 ]
 Strip = Annotated[bool, typer.Option("--strip", help="Leave out metadata, but not the colour profile.")]
 Codec = Annotated[

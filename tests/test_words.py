@@ -32,7 +32,7 @@ RENDERED = {
     "nothing": "", "a JPEG": "-o a.jpg", "its quality": "-o a.jpg --quality 30", "a WebP": "-o a.webp --quality 30",
     "animated": "-o a.webp --animated", "a TIFF": "-o a.tif --bits 16", "floats": "-o a.exr --bits 32",
     "halves": "-o a.exr --bits 16 --codec piz", "8 bits": "-o a.tif --bits 8", "stripped": "-o a.png --strip",
-    "dpi": "-o a.tif --dpi 300", "no dpi": "-o a.webp --dpi 300", "dpi of frames": "-o f.%02d.png --dpi 300",
+    "dpi": "-o a.tif --dpi 300", "dpi of a WebP": "-o a.webp --dpi 300", "dpi of frames": "-o f.%02d.png --dpi 300",
     "not stripped": "-o a.png -i tagged.png", "tagged, stripped": "-o a.png -i tagged.png --strip",
     "another picture": "-i dog.png", "several": "cat.png dog.png -o made", "by name": "cat.png dog.png -o {name}-a.png",
     "size": "--size 40", "grid": "--grid 24", "solver": "--solver paper", "duration": "--duration 0.04",

@@ -31,6 +31,7 @@ class Format:
         alpha, grey: whether it has them.
         longest: pixels along a side at most.
         codecs: ways to compress that can be asked for, the usual one first.
+        held_dpi: the dots an inch that it tells for some, where those are not the same.
         keeps: the fields of a `Picture` besides its pixels that come back from a written file.
     """
 
@@ -44,6 +45,7 @@ class Format:
     grey: bool = True
     longest: int = 2**31 - 1
     codecs: tuple[str, ...] = ()
+    held_dpi: Callable[[tuple[float, float]], tuple[float, float]] | None = None
     keeps: frozenset[str] = frozenset()
 
 
@@ -52,24 +54,24 @@ ONLY_READ = {
     "PGM": (".pgm",), "PNM": (".pnm",), "PPM": (".ppm",), "QOI": (".qoi",), "SGI": (".sgi",), "TGA": (".tga",),
 }  # fmt: skip
 EMBEDDED = frozenset({"icc", "exif", "xmp"})
-PNG_STEP = 0.0254  # dots an inch: PNG tells whole dots a metre, and no 72
+PNG_STEP = png.METRE  # PNG tells whole dots a metre, and no 72 an inch
 HEADER = frozenset({"chromaticities", "texts", "attributes"})
 TABLE = (
     Format(
         "PNG", (".png",), png.read, png.write, rb"\x89PNG\r\n\x1a\n",
-        bits=(8, 16), longest=1_000_000, keeps=EMBEDDED | {"dpi", "texts", "chunks"},
+        bits=(8, 16), longest=1_000_000, held_dpi=png.held_dpi, keeps=EMBEDDED | {"dpi", "texts", "chunks"},
     ),
     Format(
         "JPEG", (".jpg", ".jpeg"), jpeg.read, jpeg.write, rb"\xff\xd8\xff",
-        bits=(8,), alpha=False, longest=65500, keeps=EMBEDDED | {"dpi", "texts"},
+        bits=(8,), alpha=False, longest=65500, held_dpi=jpeg.held_dpi, keeps=EMBEDDED | {"dpi", "texts"},
     ),
     Format(
         "WebP", (".webp",), webp.read, webp.write, rb"RIFF....WEBP",
-        bits=(8,), grey=False, longest=16383, keeps=EMBEDDED,
+        bits=(8,), grey=False, longest=16383, keeps=EMBEDDED | {"dpi"},
     ),
     Format(
         "AVIF", (".avif",), avif.read, avif.write, rb"....ftypavi[fs]",
-        bits=(8,), grey=False, longest=32768, keeps=EMBEDDED,  # what decoders take
+        bits=(8,), grey=False, longest=32768, keeps=EMBEDDED | {"dpi"},  # what decoders take
     ),
     Format(
         "TIFF", (".tif", ".tiff"), tiff.read, tiff.write, rb"II[*+]\0|MM\0[*+]",
@@ -78,7 +80,7 @@ TABLE = (
     Format(
         "OpenEXR", (".exr",), exr.read, exr.write, rb"v/1\x01",
         bits=(16, 32), codecs=exr.COMPRESSIONS,
-        keeps=HEADER | {"layers", "parts", "group", "half", "wide", "margins", "origin", "premultiplied"},
+        keeps=HEADER | {"dpi", "layers", "parts", "group", "half", "wide", "margins", "origin", "premultiplied"},
     ),
     Format("GIF", (".gif",), partial(pillow.read, "GIF"), signature=rb"GIF8[79]a"),
     Format("BMP", (".bmp",), partial(pillow.read, "BMP"), signature=rb"BM"),
@@ -175,11 +177,11 @@ def unheld(
         losses.append(f"lacks the picture's overscan ({max(picture.margins)} px beyond the display window)")
     if picture.origin != (0, 0) and "origin" not in keeps:
         losses.append(f"begins at 0, 0 and not at {picture.origin[0]}, {picture.origin[1]} as the display window")
-    if picture.dpi and with_dpi and kind is not None and kind.name == "JPEG":
-        held = jpeg.held_dpi(picture.dpi)
+    if picture.dpi and with_dpi and kind is not None and kind.held_dpi is not None:
+        held = kind.held_dpi(picture.dpi)
         if not np.allclose(held, picture.dpi, rtol=0, atol=PNG_STEP):
             losses.append(
-                f"says {_dots(held)} dpi and not {_dots(picture.dpi)} as the picture: JPEG holds whole numbers"
+                f"says {_dots(held)} dpi and not {_dots(picture.dpi)} as the picture: {kind.name} holds whole numbers"
             )
     return f"{Path(path).name} {'; it '.join(losses)}" if losses else ""
 

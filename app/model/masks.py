@@ -140,7 +140,7 @@ class _Path(_Layer):
     hardness: Fraction01 = 0.5
 
     def intensity(self, grid: Grid, pictures: NamedPictures) -> np.ndarray:
-        return falloff(distance_to_path(places(self.points, grid), grid) / self.radius, self.hardness)
+        return falloff(distance_to_path(places(self.points, grid), grid, self.radius) / self.radius, self.hardness)
 
 
 class _Thickness(Model):
@@ -274,5 +274,6 @@ def solid(layers: Sequence[FreezeLayer], grid: Grid, pictures: NamedPictures) ->
 def _mixed(below: np.ndarray, above: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """`above` where the weight is 1, `below` where it is 0; see the module."""
     both = (below > 0) & (above > 0)
-    ratio = np.where(both, above, 1.0) / np.where(both, below, 1.0)
-    return np.where(both, below * ratio**weight, below + (above - below) * weight)
+    with np.errstate(over="ignore"):  # what is too thick is told where it is used
+        ratio = np.where(both, above, 1.0) / np.where(both, below, 1.0)
+        return np.where(both, below * ratio**weight, below + (above - below) * weight)

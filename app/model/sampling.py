@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Sequence
+from itertools import product
 from typing import Annotated, Literal, Protocol, Self
 
 import numpy as np
@@ -18,6 +19,9 @@ from app.model.schema import FileName, Fraction01, Model, Place
 from solver.components import connected_components
 from solver.grid import Grid
 
+BLOCKS = 24  # into which the longer side of a canvas is cut where only what is near matters
+PAIRS = 2**15  # of a cell and a line that are looked at in one go
+SLACK = 1e-9  # longer sides, more than distances are rounded by
 FINEST = 2048  # pixels along the longer side, at most, that masks are worked out on
 ROWS_AT_ONCE = 64  # of a canvas
 SOURCE = "source"
@@ -231,16 +235,36 @@ def places(points: Sequence[tuple[float, float]], grid: Grid) -> np.ndarray:
     return np.asarray(points, np.float64) * grid.extent
 
 
-def distance_to_path(points: np.ndarray, grid: Grid) -> np.ndarray:
-    """Distance (ny, nx) of the cell centres from a polyline (n, 2), or from a single point; all in lengths."""
+def distance_to_path(points: np.ndarray, grid: Grid, within: float = math.inf) -> np.ndarray:
+    """Distance (ny, nx) of the cell centres from a polyline (n, 2), or from a single point; all in lengths.
+
+    within: farther off, what is found may be too far.
+    """
     x, y = grid.centres()
     nearest = np.full(x.shape, np.inf)
-    for a, b in zip(points, points[1:] if len(points) > 1 else points, strict=False):
-        along = b - a
-        length2 = float(along @ along)
-        s = np.clip(((x - a[0]) * along[0] + (y - a[1]) * along[1]) / length2, 0, 1) if length2 > 0 else 0.0
-        nearest = np.minimum(nearest, np.hypot(x - a[0] - s * along[0], y - a[1] - s * along[1]))
+    ways = np.diff(points, axis=0) if len(points) > 1 else np.zeros((1, 2))
+    lines = points[: len(ways)], ways, np.array([float(way @ way) for way in ways])
+    side = -(-max(x.shape) // BLOCKS)
+    for row, column in product(*(range(0, count, side) for count in x.shape)):
+        block = slice(row, row + side), slice(column, column + side)
+        x_here, y_here = x[block], y[block]
+        middle_x, middle_y = x_here.mean(keepdims=True), y_here.mean(keepdims=True)
+        reach = np.hypot(x_here - middle_x, y_here - middle_y).max()
+        far = _from_lines(middle_x, middle_y, *lines)[0, 0]
+        # Only these may be the nearest of any cell here: the others are farther off than one of them, wherever it lies.
+        near = np.flatnonzero(far <= min(far.min() + 2 * reach, within + reach) + SLACK)
+        several = max(PAIRS // x_here.size, 1)
+        for first in range(0, len(near), several):
+            found = _from_lines(x_here, y_here, *(part[near[first : first + several]] for part in lines)).min(axis=2)
+            np.minimum(nearest[block], found, out=nearest[block])
     return nearest
+
+
+def _from_lines(x: np.ndarray, y: np.ndarray, starts: np.ndarray, ways: np.ndarray, lengths2: np.ndarray) -> np.ndarray:
+    """Distances (h, w, n) of places (h, w) from lines that begin at starts (n, 2) and go ways (n, 2), squared (n,)."""
+    (along_x, along_y), x, y = ways.T, x[..., None] - starts[:, 0], y[..., None] - starts[:, 1]
+    s = np.clip((x * along_x + y * along_y) / np.where(lengths2 > 0, lengths2, 1.0), 0, 1)
+    return np.hypot(x - s * along_x, y - s * along_y)
 
 
 class Window(Model):

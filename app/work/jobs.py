@@ -112,9 +112,7 @@ class Outputs:
             return
         if self.file is None or self.is_animation:
             raise UserError("--dpi is for a single picture, and none is written; leave it out")
-        if "dpi" not in (form := picture_format(self.file)).keeps:
-            raise UserError(f"{form.name} holds no resolution; leave out --dpi, or write a PNG, JPEG or TIFF")
-        if form.name == "JPEG" and not isclose(held_dpi((self.dpi, self.dpi))[0], self.dpi):
+        if picture_format(self.file).name == "JPEG" and not isclose(held_dpi((self.dpi, self.dpi))[0], self.dpi):
             raise UserError(f"JPEG holds whole dots per inch, not {self.dpi:g}; round --dpi, or write a PNG or TIFF")
 
     def write(self, picture: Picture, quality: int) -> None:

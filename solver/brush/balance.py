@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 # In which those that would be too strong are weighed anew: so many rounds, and no more than take so many
-# multiplications, as many as a core does in about half a second.
-ROUNDS, MOST_WORK = 12, 2**33
+# multiplications, as many as a core does in about a quarter of a second.
+ROUNDS, MOST_WORK = 12, 2**32
 CLOSE = 1.01  # times its bound where that ends; by as much as one still exceeds it, all are less
 
 

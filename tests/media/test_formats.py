@@ -50,7 +50,7 @@ def full(bits: int) -> Picture:
         chromaticities=(0.68, 0.32, 0.265, 0.69, 0.15, 0.06, 0.3127, 0.329),
         texts={"Comment": "seen by me"},
         premultiplied=True,
-        attributes={"pixelAspectRatio": 2.0},
+        attributes={"pixelAspectRatio": 0.5},
         chunks={b"gAMA": (100_000).to_bytes(4, "big")},
         layers=(Layer("Z", np.ones((35, 43), np.float32), exact=True, part=0),),
         parts=({"name": "depth"}, {"name": "beauty"}),

@@ -7,11 +7,13 @@ import os
 import struct
 import subprocess
 import zlib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
+import OpenEXR
 import pytest
 import tifffile
 from PIL import Image, ImageCms, JpegImagePlugin, PngImagePlugin
@@ -23,7 +25,7 @@ from app.media.codecs.exr import read_channels
 from app.media.depth import to_bits
 from app.media.encoders import check_output
 from app.media.ffmpeg import executable
-from app.media.formats import unheld
+from app.media.formats import FORMATS, unheld
 from app.media.pictures import read_picture, write_picture
 from app.model.picture import Picture, linear_to_srgb, srgb_to_linear
 from app.work.jobs import Outputs
@@ -642,8 +644,7 @@ def test_profile_and_metadata_are_kept_or_stripped(tmp_path: Path, ending: str):
     assert again.get_ifd(0x8825)[1] == "N"
     assert read.xmp is not None
     assert b'Orientation="1"' in read.xmp
-    if ending in (".png", ".jpg", ".tif"):
-        assert read.dpi == pytest.approx((300, 300), abs=0.01)
+    assert read.dpi == pytest.approx((300, 300), abs=0.01)
     if ending in (".png", ".jpg"):
         assert read.texts["Comment"] == "hübsch"
     write_picture(path, given, strip=True)
@@ -654,7 +655,7 @@ def test_profile_and_metadata_are_kept_or_stripped(tmp_path: Path, ending: str):
     assert not stripped.texts
 
 
-@pytest.mark.parametrize("ending", ["jpg", "png", "tif"])
+@pytest.mark.parametrize("ending", ["avif", "jpg", "png", "tif", "webp"])
 def test_a_resolution_that_is_asked_for_stands_in_the_file_and_in_its_exif(tmp_path: Path, ending: str):
     exif = Image.Exif()
     exif.update({282: 72.0, 283: 72.0, 296: 3, 271: "Maker"})
@@ -975,6 +976,97 @@ def test_a_jpeg_is_as_dense_as_the_picture_or_it_is_told(
     assert not unheld(tmp_path / "a.tif", picture)
     assert not unheld(path, picture, with_dpi=False)
     assert unheld(path, read_picture(path)) == ""
+
+
+def told_dpi(path: Path) -> tuple[float, float] | None:
+    """Dots an inch along x and y as Pillow finds them, OpenEXR or tifffile."""
+    if path.suffix in (".tif", ".tiff"):
+        with tifffile.TiffFile(path) as tiff:
+            tags = tiff.pages.first.tags
+            x, y = (tags[code].value[0] / tags[code].value[1] for code in (282, 283))
+            return (x, y) if tags[296].value == 2 else None
+    if path.suffix == ".exr":
+        header = OpenEXR.File(str(path), header_only=True).header()
+        x = header.get("xDensity")
+        return None if x is None else (x, x * header["pixelAspectRatio"])
+    with Image.open(path) as image:
+        exif = image.getexif()
+        if image.info.get("dpi") or 282 not in exif:
+            return image.info.get("dpi")
+        assert exif[296] == 2
+        return float(exif[282]), float(exif[283])
+
+
+@pytest.mark.parametrize("ending", FORMATS)
+@pytest.mark.parametrize("dpi", [(300.0, 300.0), (300.0, 150.0), (72.0, 36.0)])
+def test_every_format_tells_another_program_the_dots_per_inch(
+    tmp_path: Path, ending: str, dpi: tuple[float, float]
+) -> None:
+    path, exif = tmp_path / f"a{ending}", Image.Exif()
+    exif.update({271: "Maker", 282: 118.0, 283: 118.0, 296: 3})  # of the camera: another one, a centimetre
+    for given in (Picture(smooth(3), dpi=dpi), Picture(smooth(3), dpi=dpi, exif=exif.tobytes())):
+        if ending in (".webp", ".avif", ".exr") or not given.exif:
+            write_picture(path, given)
+            assert told_dpi(path) == pytest.approx(dpi, abs=0.02)
+            assert read_picture(path).dpi == pytest.approx(dpi, abs=0.02)
+            assert not unheld(path, given)
+    write_picture(path, replace(given, dpi=None, exif=None))
+    assert told_dpi(path) is None
+    write_picture(path, given, strip=True)
+    assert told_dpi(path) is None
+
+
+@pytest.mark.parametrize("ending", [".webp", ".avif"])
+def test_dots_per_inch_that_stand_in_exif_are_read_there(tmp_path: Path, ending: str) -> None:
+    path, exif = tmp_path / f"a{ending}", Image.Exif()
+    exif.update({282: 100.0, 283: 50.0, 296: 3, 274: 6})  # a centimetre, and turned
+    Image.fromarray(smooth(3)).save(path, exif=exif)
+    assert read_picture(path).dpi == pytest.approx((127, 254))
+    write_picture(tmp_path / "b.png", read_picture(path))
+    assert told_dpi(tmp_path / "b.png") == pytest.approx((127, 254), abs=0.02)
+    with Image.open(tmp_path / "b.png") as image:
+        assert [image.getexif()[code] for code in (282, 283, 296, 274)] == [50, 100, 3, 1]
+    exif.update({296: 1, 274: 1})  # the shape of a pixel alone
+    Image.fromarray(smooth(3)).save(path, exif=exif)
+    assert read_picture(path).dpi is None
+    exif[296] = 2
+    assert struct.pack(">HH", 282, 5) in exif.tobytes()  # a fraction, of which a text is made
+    damaged = exif.tobytes().replace(struct.pack(">HH", 282, 5), struct.pack(">HH", 282, 2))
+    Image.fromarray(smooth(3)).save(path, exif=damaged)
+    assert read_picture(path).dpi is None
+
+
+@pytest.mark.parametrize("aspect", [1.0, 2.0])
+def test_the_density_of_an_exr_is_that_of_what_is_made_of_it(tmp_path: Path, aspect: float) -> None:
+    with (tmp_path / "a.exr").open("wb") as stream:
+        told = {"xDensity": 72.1, "pixelAspectRatio": aspect, "type": OpenEXR.scanlineimage}
+        OpenEXR.File(told, {name: np.zeros((4, 5), np.float32) for name in "RGB"}).write(stream)
+    before = OpenEXR.File(str(tmp_path / "a.exr"), header_only=True).header()
+    for ending in FORMATS:
+        path, picture = tmp_path / f"b{ending}", read_picture(tmp_path / "a.exr")
+        write_picture(path, picture)
+        told = unheld(path, picture)
+        assert ("dpi" in told) == (ending in (".jpg", ".jpeg"))
+        assert told_dpi(path) == pytest.approx((72.1, 72.1 * aspect), abs=0.5 if told else 0.02)
+    after = OpenEXR.File(str(tmp_path / "b.exr"), header_only=True).header()
+    assert [after[name] for name in ("xDensity", "pixelAspectRatio")] == [before["xDensity"], aspect]
+    write_picture(path, picture, dpi=300.0)  # a pixel stays as long as it is seen
+    assert told_dpi(path) == pytest.approx((300, 300 * aspect))
+
+
+@pytest.mark.parametrize("dots", [(2**30, 1), (1, 2**30), (2**32 - 1, 1)])
+def test_dots_per_inch_that_nothing_prints_do_no_harm(tmp_path: Path, dots: tuple[int, int]) -> None:
+    Image.fromarray(smooth(3)).save(tmp_path / "a.tif", dpi=(72.0, 72.0))
+    data = (tmp_path / "a.tif").read_bytes()
+    (tmp_path / "a.tif").write_bytes(data.replace(struct.pack("<II", 72, 1), struct.pack("<II", *dots)))
+    picture = read_picture(tmp_path / "a.tif")
+    for ending in FORMATS:
+        path = tmp_path / f"b{ending}"
+        write_picture(path, picture)
+        assert (read_picture(path).dpi is None) == (picture.dpi is None)
+    assert (picture.dpi is None) == (dots[0] == 2**32 - 1)
+    most_of_png = "b.png says 5.45461e+07 dpi and not 1.07374e+09 as the picture: PNG holds whole numbers"
+    assert unheld(tmp_path / "b.png", picture) == (most_of_png if dots[0] == 2**30 else "")
 
 
 def test_dots_per_inch_that_are_no_number_are_none(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -273,3 +274,12 @@ def test_factors_cannot_run_away(pictures: Pictures) -> None:
     layers = [layer(kind="constant", scale=1e4), layer(kind="constant", scale=1e4, combine="multiply")]
     with pytest.raises(UserError, match="the most is"):
         viscosity(layers, 0, GRID, pictures)
+
+
+def test_what_is_all_but_nothing_beside_much_is_told_in_the_sentence_alone(pictures: Pictures) -> None:
+    window = {"box": [0.2, 0.2, 0.8, 0.8], "soft": 0.2}
+    layers = [layer(kind="constant", scale=5e-324), layer(kind="constant", scale=1e6, window=window)]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(UserError, match="reaches inf; the most is"):
+            viscosity(layers, 0, GRID, pictures)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -53,6 +54,25 @@ def test_a_path_ends_at_its_ends() -> None:
     np.testing.assert_allclose(found, np.minimum(*along), atol=1e-12)
     dot = distance_to_path(np.array([(0.3, 0.25)]), grid)
     np.testing.assert_allclose(dot, np.hypot(x - 0.3, y - 0.25), atol=1e-12)
+
+
+@pytest.mark.parametrize(("size", "count"), [((40, 20), 2), ((40, 20), 300), ((130, 75), 60), ((9, 8), 5)])
+def test_a_path_is_as_near_as_the_nearest_of_all_its_lines(size: tuple[int, int], count: int) -> None:
+    """To the bit, however its canvas is cut; two of its points are one, and some lie outside."""
+    grid, points = Grid(*size), np.random.default_rng(count).uniform(-0.5, 1.5, (count, 2))
+    points[-1] = points[-2]
+    x, y = grid.centres()
+    wanted = np.full(x.shape, np.inf)
+    for a, b in pairwise(points):
+        along = b - a
+        length2 = float(along @ along)
+        s = np.clip(((x - a[0]) * along[0] + (y - a[1]) * along[1]) / length2, 0, 1) if length2 > 0 else 0.0
+        wanted = np.minimum(wanted, np.hypot(x - a[0] - s * along[0], y - a[1] - s * along[1]))
+    np.testing.assert_array_equal(distance_to_path(points, grid), wanted)
+    for within in (0.001, 0.05, 0.3):
+        found = distance_to_path(points, grid, within)
+        np.testing.assert_array_equal(found[wanted <= within], wanted[wanted <= within])
+        assert (found[wanted > within] > within).all()
 
 
 def test_a_window_rises_smoothly_within_its_soft_edge() -> None:

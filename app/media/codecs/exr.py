@@ -13,6 +13,7 @@ import numpy as np
 from app.errors import UserError
 from app.media.codecs.decoding import decoding, head_of, quiet
 from app.media.codecs.exr_header import Raw, fill_rooms, raw_attributes, room_for
+from app.media.codecs.metadata import upright_dpi
 from app.media.depth import as_half
 from app.media.inputs import MAX_PIXELS, check_size
 from app.media.losses import counted, lost, not_kept
@@ -27,6 +28,8 @@ LAYOUT = frozenset(
 )
 PART_NAMES = ("name", "view")
 SHARED = {"pixelAspectRatio", "timeCode", "chromaticities"}  # which all parts must have alike
+# Dots an inch along x; along y there are so many times as many.
+DENSITY, ASPECT = "xDensity", "pixelAspectRatio"
 NUMBERS, CENTRE = ("int", "float"), "screenWindowCenter"  # that a header always has, and OpenEXR writes itself
 
 COMPRESSIONS = ("zip", "zips", "piz", "rle", "none", "pxr24", "dwaa", "dwab", "b44", "b44a")
@@ -111,6 +114,7 @@ def read(file: Path, max_pixels: int) -> Picture:
         np.ascontiguousarray(inside),
         chromaticities=own.chromaticities,
         texts={key: text for key, text in own.texts.items() if key not in PART_NAMES},
+        dpi=_dpi(own.attributes),
         premultiplied=True,
         attributes=own.attributes,
         layers=tuple(layers),
@@ -257,6 +261,12 @@ def _colours(parts: Sequence[_Part]) -> tuple[int, str, str] | None:
     return min(found, key=lambda one: one[:3])[2:] if found else None
 
 
+def _dpi(attributes: Mapping[str, Any]) -> tuple[float, float] | None:
+    """Dots an inch along x and y, if the header tells them as it should."""
+    x, aspect = attributes.get(DENSITY), attributes.get(ASPECT, 1.0)
+    return upright_dpi((x, x * aspect), 1) if isinstance(x, float) and isinstance(aspect, float) else None
+
+
 def _is_exact(name: str, dtype: np.dtype, cryptomattes: tuple[str, ...]) -> bool:
     """Whether a mean of a channel's values would be none of them: ids, depths and places."""
     words = name.split(".")
@@ -287,6 +297,10 @@ def write(path: Path, picture: Picture, quality: int, codec: str | None = None) 
     if picture.half:
         pixels = as_half(pixels)
     attributes: dict[str, Any] = {**picture.texts, **picture.attributes}
+    if picture.dpi:
+        attributes[DENSITY] = picture.dpi[0]
+        if picture.dpi[0] != picture.dpi[1]:  # a picture's own says what is seen, and is not for print alone
+            attributes.setdefault(ASPECT, picture.dpi[1] / picture.dpi[0])
     if picture.chromaticities:
         attributes["chromaticities"] = picture.chromaticities
     own, prefix = picture.group

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from math import inf
 from typing import Any
 
 import numpy as np
@@ -12,15 +11,29 @@ import numpy as np
 from app.model.picture import Picture
 
 ORIENTATION, EXIF_IFD = 0x0112, 0x8769
+# More dots an inch no fraction of EXIF and TIFF tells, and OpenEXR has no pixel that is longer in comparison.
+MOST_DOTS, NARROWEST = 2.0**31, 1e6
+INCHES = {2: 1.0, 3: 2.54}  # dots an inch for one in each of the units that are lengths
 RESOLUTION = {0x011A: 0, 0x011B: 0, 0x0128: 2}  # EXIF's codes of x, y and their unit; 2 is an inch
 
 
 def upright_dpi(dpi: Any, orientation: int) -> tuple[float, float] | None:
-    """Pixels an inch along x and y of the upright picture, if they are told at all."""
-    if not dpi or len(dpi) != 2 or not all(0 < float(value) < inf for value in dpi):
+    """Pixels an inch along x and y of the upright picture, if they are told, and so that every kind of file can."""
+    if not dpi or len(dpi) != 2 or not all(1 / MOST_DOTS < float(value) < MOST_DOTS for value in dpi):
         return None
     x, y = float(dpi[0]), float(dpi[1])
+    if not 1 / NARROWEST < y / x < NARROWEST:
+        return None
     return (y, x) if orientation in (5, 6, 7, 8) else (x, y)
+
+
+def told_dpi(exif: Any) -> tuple[float, float] | None:
+    """Dots an inch along x and y that Pillow's `exif` tells, if it does; perhaps damaged ones."""
+    try:
+        unit = INCHES[exif.get(0x0128, 2)]
+        return float(exif[0x011A]) * unit, float(exif[0x011B]) * unit
+    except (KeyError, TypeError, ValueError, OverflowError):
+        return None
 
 
 def upright(pixels: np.ndarray, orientation: int) -> np.ndarray:
@@ -39,6 +52,9 @@ def upright_exif(exif: Any) -> bytes | None:
     if not exif:
         return None
     if ORIENTATION in exif:
+        x, y, _ = RESOLUTION
+        if exif[ORIENTATION] in (5, 6, 7, 8) and x in exif and y in exif:
+            exif[x], exif[y] = exif[y], exif[x]
         exif[ORIENTATION] = 1
     try:
         return exif.tobytes()
@@ -81,6 +97,9 @@ def printed_at(picture: Picture, dpi: float) -> Picture:
     return replace(picture, dpi=(dpi, dpi), exif=encoded)
 
 
-def sized_exif(picture: Picture) -> bytes:
-    """The picture's EXIF, telling its present size."""
-    return exif_of(picture).tobytes() if picture.exif else b""
+def sized_exif(picture: Picture, with_dpi: bool = False) -> bytes:
+    """The picture's EXIF, telling its present size, and its resolution if that has no other place in a file."""
+    exif, dpi = exif_of(picture), picture.dpi if with_dpi else None
+    if dpi and told_dpi(exif) != dpi:
+        exif.update(dict(zip(RESOLUTION, (*dpi, 2), strict=True)))
+    return exif.tobytes() if picture.exif or dpi else b""

@@ -13,11 +13,12 @@ import numpy as np
 
 from app.errors import UserError
 from app.media.codecs.cmyk import INK, cmyk_to_rgb
-from app.media.codecs.metadata import ORIENTATION, sized_exif, upright, upright_dpi, upright_exif, upright_xmp
+from app.media.codecs.metadata import ORIENTATION, sized_exif, told_dpi, upright, upright_dpi, upright_exif, upright_xmp
 from app.media.inputs import check_size
 from app.media.losses import lost
 from app.model.picture import Picture
 
+IN_EXIF = ("WEBP", "AVIF")  # which tell their resolution there, and nowhere else
 MOST_TEXT = 64 * 2**20  # bytes of a profile or text in a PNG, unpacked
 
 
@@ -63,6 +64,7 @@ def picture_of(image: Any, file: Path, losses: list[str], pixels: np.ndarray | N
         warnings.simplefilter("always")
         Image.Exif().load(image.info.get("exif", b""))  # read once more: of a JPEG that is done when it is opened
         exif = image.getexif()
+        dpi = told_dpi(exif) if image.format in IN_EXIF else image.info.get("dpi")
         orientation, encoded = exif.get(ORIENTATION, 1), upright_exif(exif)
     if complaints or (exif and encoded is None):
         losses.append("its EXIF is damaged and not kept whole")
@@ -81,7 +83,7 @@ def picture_of(image: Any, file: Path, losses: list[str], pixels: np.ndarray | N
         icc=icc,
         exif=encoded,
         xmp=upright_xmp(xmp.encode() if isinstance(xmp, str) else xmp),
-        dpi=upright_dpi(image.info.get("dpi"), orientation),
+        dpi=upright_dpi(dpi, orientation),
         texts={key: text.replace("\0", "") for key, text in texts.items() if key},
         note=lost(file, losses),
     )
@@ -98,7 +100,7 @@ def write(name: str, path: Path, picture: Picture, quality: int, **options: Any)
     """Write a file of Pillow's kind `name`, with these options of its encoder."""
     from PIL import Image
 
-    options |= {"quality": quality, "icc_profile": picture.icc, "exif": sized_exif(picture)}
+    options |= {"quality": quality, "icc_profile": picture.icc, "exif": sized_exif(picture, with_dpi=name in IN_EXIF)}
     if picture.xmp:
         options["xmp"] = picture.xmp
     pixels = picture.pixels[..., 0] if picture.pixels.shape[2] == 1 else picture.pixels

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import struct
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
@@ -23,6 +24,7 @@ TEXT_CHUNKS = (b"tEXt", b"zTXt", b"iTXt")
 UNDERSTOOD = {
     b"IHDR", b"PLTE", b"IDAT", b"tRNS", b"iCCP", b"pHYs", b"eXIf", b"tIME", b"acTL", b"fcTL", b"fdAT", b"iDOT", b"hIST",
 }  # fmt: skip
+METRE, MOST_DOTS = 0.0254, 2**31 - 1  # dots an inch for one a metre, of which there are whole ones, and how many
 USUAL_GAMMA = range(45000, 46000)  # 1 / 2.2, as sRGB has it on the whole
 
 
@@ -113,8 +115,7 @@ def write(path: Path, picture: Picture, quality: int) -> None:
     if picture.icc:
         extra.add(b"iCCP", b"ICC Profile\0\0" + zlib.compress(picture.icc))
     if picture.dpi:
-        metre = [round(value / 0.0254).to_bytes(4, "big") for value in picture.dpi]
-        extra.add(b"pHYs", b"".join(metre) + b"\1")
+        extra.add(b"pHYs", struct.pack(">IIB", *_dots_a_metre(picture.dpi), 1))
     if picture.exif:
         extra.add(b"eXIf", sized_exif(picture).removeprefix(b"Exif\0\0"))
     if picture.xmp:
@@ -126,3 +127,14 @@ def write(path: Path, picture: Picture, quality: int) -> None:
         putchunk(chunks, kind, data)
     header = 8 + 25  # the signature and IHDR, after which all of these may stand
     path.write_bytes(b"".join([encoded[:header], chunks.getvalue(), encoded[header:]]))
+
+
+def held_dpi(dpi: tuple[float, float]) -> tuple[float, float]:
+    """Dots an inch along x and y as a PNG tells them that is written of a picture with so many."""
+    x, y = _dots_a_metre(dpi)
+    return x * METRE, y * METRE
+
+
+def _dots_a_metre(dpi: tuple[float, float]) -> tuple[int, int]:
+    x, y = (min(max(round(value / METRE), 1), MOST_DOTS) for value in dpi)
+    return x, y

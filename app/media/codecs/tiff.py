@@ -17,7 +17,16 @@ import numpy as np
 from app.errors import UserError
 from app.media.codecs import ZLIB_LEVEL
 from app.media.codecs.cmyk import INK, cmyk_to_rgb
-from app.media.codecs.metadata import EXIF_IFD, ORIENTATION, exif_of, upright, upright_dpi, upright_exif, upright_xmp
+from app.media.codecs.metadata import (
+    EXIF_IFD,
+    INCHES,
+    ORIENTATION,
+    exif_of,
+    upright,
+    upright_dpi,
+    upright_exif,
+    upright_xmp,
+)
 from app.media.inputs import check_size
 from app.media.losses import lost, not_kept
 from app.model.picture import Picture
@@ -108,7 +117,7 @@ def read(file: Path, max_pixels: int, place: int | None = None) -> Picture:
             encoded = None
             losses.append("its EXIF is damaged and not kept whole")
     orientation = int(tags.get(ORIENTATION, 1))
-    unit = {2: 1.0, 3: 2.54}.get(int(tags.get(296, 2)))
+    unit = INCHES.get(int(tags.get(296, 2)))
     resolution = [tags[code][0] / tags[code][1] for code in (282, 283) if code in tags and tags[code][1]]
     if unit is None and len(set(resolution)) > 1:
         losses.append(f"the shape of its pixels ({resolution[1]:g}:{resolution[0]:g}) is not kept")
