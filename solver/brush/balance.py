@@ -38,9 +38,9 @@ class Balance:
         self._pushes = 2 * len(bounds)
         self._of_all = system(influence, soft, shares)
 
-    def strengths(self, wanted: np.ndarray) -> np.ndarray:
-        """Of all unknowns, (k,), for what is wanted, (n,)."""
-        found = self._each_within(wanted)
+    def strengths(self, wanted: np.ndarray, parts: np.ndarray | float = 1.0) -> np.ndarray:
+        """Of all unknowns, (k,), for what is wanted, (n,), of each a part, (k,), as it is then no longer balanced."""
+        found = parts * self._each_within(wanted)
         return found / max(self._over_together(found), 1.0)
 
     def _each_within(self, wanted: np.ndarray) -> np.ndarray:

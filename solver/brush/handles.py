@@ -98,7 +98,8 @@ class Lead(NamedTuple):
         places, radii: of all of them, (n, 2) and (n,).
         pushed: the numbers of those that are pushed, p of them.
         pushes: m of them, one at each that is pushed, and some wide ones.
-        drawn: of each push the number of its point, (m,).
+        looked_at: where the fluid is looked at, and how far around: at all points, then at wide pushes, (n + w, 3).
+        drawn: of each push its number among these, (m,).
         rings: r of them.
         loops: which of them are closed lines.
         balance: what gives the strengths of pushes and of turns of rings, 2 m + r, for what the pushed and rings lack,
@@ -111,6 +112,7 @@ class Lead(NamedTuple):
     radii: np.ndarray
     pushed: np.ndarray
     pushes: Pushes
+    looked_at: np.ndarray
     drawn: np.ndarray
     rings: list[Ring]
     loops: list[slice]
@@ -135,9 +137,7 @@ class Handles:
         check_type("what handles look at", warp, WarpMap)
         self._fluid, self._warp, self._forward = fluid, warp, ForwardMap(warp)
         self._stream = fluid.device.field((fluid.grid.nx + 1, fluid.grid.ny + 1), 1, "stream function of handles")
-        self._thickest = fluid.device.field(self._stream.size, 1, "viscosity at the nodes")
-        self._part = fluid.device.field((1, 1), 1, "a factor of handles")
-        self._motion = fluid.device.field((1, 1), 4, "motion at a handle")
+        self._at_rest = fluid.device.field((1, 1), 4, "no motion")
         self._brush, self._strain = Brush(fluid.device), Strain(warp)
         # Where the points of those that have begun are, and were then; NaN for the others.
         self._places = self._starts = np.zeros((0, 2))
@@ -242,16 +242,24 @@ class Handles:
         del push  # of many points it is as large as all that balancing needs
         balance = Balance(influence, soft, weights, (owners[0], owners[1]), bounds)
         self._places[listed] += wanted * dt  # where to look for them
-        lead = self._lead = Lead(places, radii, pushed, pushes, drawn, rings, loops, balance, wanted, carried)
+        narrow, others = np.column_stack([places, radii]), np.column_stack([places, wide])[pushed[near_others]]
+        looked_at, drawn = (
+            np.concatenate([narrow, others]),
+            np.concatenate([pushed, len(places) + np.arange(len(others))]),
+        )
+        lead = self._lead = Lead(
+            places, radii, pushed, pushes, looked_at, drawn, rings, loops, balance, wanted, carried
+        )
         self._fluid.impulse.add(lambda faces: self._give(lead, faces))
 
     def make_up(self, velocity: Field) -> None:
         """After viscosity, before the projection: add to a velocity on MAC faces what is still lacking.
 
-        For `steer` of `Scheme.step`. Spares what is thicker than at each handle, as `Brush.make_up`.
+        For `steer` of `Scheme.step`. Of each push less, in all its places alike, the more of it lies on what is thicker
+        than at its middle, or solid.
         """
         if self._lead is not None:
-            self._give(self._lead, velocity, ATTENUATED=1)
+            self._give(self._lead, velocity, is_sparing=True)
 
     def carry(self) -> None:
         """After a step: let what is local carry the picture until the fluid's next one."""
@@ -364,7 +372,7 @@ class Handles:
 
     def release(self) -> None:
         """Free the textures."""
-        for thing in (self._stream, self._thickest, self._part, self._motion, self._forward, self._brush, self._strain):
+        for thing in (self._stream, self._at_rest, self._forward, self._brush, self._strain):
             thing.release()
 
     # -- where they are ---------------------------------------------------------------------------------------------
@@ -525,9 +533,9 @@ class Handles:
         handles.release()
 
     def _probed(self, lead: Lead, velocity: Field) -> np.ndarray:
-        """At the active handles: velocity, the part that a brush may do, viscosity; (n, 4) float64."""
+        """Where it is looked at for them: velocity, the part that a brush may do, viscosity; (n + w, 4) float64."""
         fluid, device = self._fluid, self._fluid.device
-        listed = np.column_stack([lead.places - fluid.grid.origin, lead.radii])
+        listed = lead.looked_at - [*fluid.grid.origin, 0.0]
         handles = device.upload(listed[None].astype(np.float32), "handles")
         found = Field(device, handles.size, 4, "fluid at the handles", cleared=False)
         inputs: dict[str, Any] = {
@@ -543,40 +551,31 @@ class Handles:
         found.release()
         return values
 
-    def _spin(self, ring: Ring, speed: float, faces: Field, found: np.ndarray, **attenuated: Any) -> None:
+    def _spin(self, ring: Ring, speed: float, faces: Field) -> None:
         """Add a turn of a ring to a velocity on MAC faces."""
-        fluid = self._fluid
-        masks: dict[str, Any] = {}
-        if attenuated:
-            self._part.clear(float(found[2]))
-            masks = {"viscosity": fluid.viscosity, "obstruction": self._part}
-        self._motion.clear(0.0, 0.0, 0.0, float(found[3]))
-        twirl, vectors = fluid.device.pass_("brush/twirl.frag", **attenuated), [(speed / ring.length, 0.0)]
-        ring.tip.draw(twirl, faces, fluid.grid, vectors, add=True, motion=self._motion, gain=1.0, **masks)
+        twirl, vectors = self._fluid.device.pass_("brush/twirl.frag"), [(speed / ring.length, 0.0)]
+        ring.tip.draw(twirl, faces, self._fluid.grid, vectors, add=True, motion=self._at_rest, gain=1.0)
 
-    def _give(self, lead: Lead, faces: Field, **attenuated: Any) -> None:
+    def _give(self, lead: Lead, faces: Field, is_sparing: bool = False) -> None:
         """Add to a velocity on MAC faces what the active handles lack of the wanted one."""
         if not len(lead.places):
             return
         fluid, grid = self._fluid, self._fluid.grid
         found = self._probed(lead, faces)
-        missing = lead.wanted - found[:, :2]
+        missing = lead.wanted - found[: len(lead.places), :2]
         for loop in lead.loops:  # the fluid swells by itself: (H4)
             arms = lead.places[loop] - lead.places[loop].mean(axis=0)
             missing[loop] -= swelling(lead.places[loop], missing[loop]) / 2 * arms
         asked = np.concatenate([missing[lead.pushed].ravel(), _spins(missing, lead.rings)])
-        strengths, count = lead.balance.strengths(asked), 2 * len(lead.drawn)
+        of_each = np.concatenate([np.repeat(lead.drawn, 2), [ring.centre for ring in lead.rings]]).astype(int)
+        parts = found[of_each, 2] if is_sparing else 1.0
+        strengths, count = lead.balance.strengths(asked, parts), 2 * len(lead.drawn)
         forces, spins = strengths[:count].reshape(-1, 2), strengths[count:]
-        masks: dict[str, Any] = {}
-        if attenuated:
-            forces *= found[lead.drawn, 2:3]
-            masks["thickest"] = self._thickest
-            fluid.device.pass_("brush/thickest.frag")(self._thickest, viscosity=fluid.viscosity)
         for ring, spin in zip(lead.rings, spins.tolist(), strict=True):
-            self._spin(ring, spin, faces, found[ring.centre], **attenuated)
+            self._spin(ring, spin, faces)
         self._stream.clear()
-        stream = fluid.device.pass_("brush/handle_stream.frag", **attenuated)
-        lead.pushes.draw(fluid.device, stream, self._stream, found[lead.drawn, 3], forces, **masks)
+        stream = fluid.device.pass_("brush/handle_stream.frag")
+        lead.pushes.draw(fluid.device, stream, self._stream, forces)
         fluid.device.pass_("brush/curl.frag")(faces, add=True, stream=self._stream, spacing=grid.spacing)
 
 

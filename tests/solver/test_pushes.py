@@ -27,7 +27,7 @@ def at_faces(influence: list[np.ndarray]) -> list[np.ndarray]:
 
 def test_pushes_flow_as_they_are_reckoned_to(device: Device):
     pushes, stream = Pushes(GRID, PLACES, RADII), device.field((129, 97), 1)
-    pushes.draw(device, device.pass_("brush/handle_stream.frag"), stream, np.ones(4), FORCES)
+    pushes.draw(device, device.pass_("brush/handle_stream.frag"), stream, FORCES)
     velocity = device.field(GRID.size, 2)
     device.pass_("brush/curl.frag")(velocity, stream=stream, spacing=GRID.spacing)
     assert np.abs(np.concatenate([stream.get()[[0, -1]].ravel(), stream.get()[:, [0, -1]].ravel()])).max() < 1e-6

@@ -303,6 +303,7 @@ SHORT = [[0.5954, 0.8611], [0.5953, 0.8612], [0.5953, 0.8611]]  # all its points
 BESIDE = [[0.5364, 0.6153], [0.536, 0.6153], [0.5356, 0.6153], [0.536, 0.6153]]
 DICE = np.random.default_rng(20)
 ON_ONE_ANOTHER, APART = (0.5 + 0.001 * DICE.normal(size=(20, 2))).tolist(), DICE.uniform(0.1, 0.9, (20, 2)).tolist()
+TURNED = [[0.59, 0.65], [0.38, 0.78], [0.38, 0.5]]
 TOO_STRONG = {
     "short lines that are opened, each in the other's way": (
         (96, 128),
@@ -319,6 +320,14 @@ TOO_STRONG = {
         [
             {"points": [[0.95, 0.5], [0.57, 0.58], [0.75, 0.75], [0.8, 0.28]], "to": [0.96, 0.03], "rotate": -73.0}
             | {"radius": 1.0, "duration": 0.1}
+        ],
+    ),
+    "a line and a pin at a hard border of thickness": (
+        (400, 20),
+        [{"kind": "path", "points": [[0.36, 0.15]], "radius": 0.05, "hardness": 1.0, "range": [1e-5, 0.01]}],
+        [
+            {"points": TURNED, "goals": TURNED[::-1]},
+            {"at": [0.31, 0.3], "to": [0.31, 0.3], "points": [[0.57, 0.1], [0.18, 0.54], [0.34, 0.19]]},
         ],
     ),
     "points that lie on one another, led apart by local pushes": (
@@ -338,6 +347,33 @@ def test_pushes_that_would_be_too_strong_together_fold_nothing(name: str, device
         replay.advance()
         assert replay.warp.statistics().folds == 0
     replay.release()
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_what_is_made_up_is_less_beside_what_is_thick_and_in_all_places_alike(count: int, device: Device):
+    """Less only where it is thick, it flowed back along the border in a row of cells, 1.8 times as fast as the handle.
+
+    Of two that go the same way, what is thick lies within their wide pushes only.
+    """
+    drawn, x, border = list[np.ndarray](), 0.4, 64 if count == 1 else 92
+    for thickest in (0.0065, 0.65):
+        fluid = Fluid(device, Grid(128, 128))
+        warp, velocity = WarpMap(device, fluid.grid), device.field(fluid.grid.size, 2)
+        fluid.set_viscosity(np.broadcast_to(np.where(np.arange(128) < border, 0.0065, thickest), (128, 128)))
+        ways = [Handle((x, y), (x, y + 0.4), RADIUS, duration=0.1) for y in (0.3, 0.5)[-count:]]
+        handles = Handles(fluid, warp, ways)
+        handles.lead(DT, 0.0)
+        fluid.impulse.clear()
+        handles.make_up(velocity)
+        drawn.append(velocity.get())
+        for thing in (handles, velocity, warp, fluid):
+            thing.release()
+    thin, thick = drawn[0][:, 8:120], drawn[1][:, 8:120]
+    reached = thin[:, 74:] if count == 2 else thin  # what narrow pushes reach goes as before
+    part = (thick[:, -len(reached[0]) :] * reached).sum() / (reached**2).sum()
+    assert np.abs(reached).max() > 0.01
+    assert 0.1 < part < 0.9
+    np.testing.assert_allclose(thick[:, -len(reached[0]) :], part * reached, atol=1e-3 * np.abs(reached).max())
 
 
 def test_what_is_frozen_beside_a_handle_is_told(device: Device):
