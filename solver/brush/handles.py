@@ -14,6 +14,7 @@ import numpy as np
 
 from solver.brush.balance import Balance, solved
 from solver.brush.brush import Brush
+from solver.brush.distance import Distance
 from solver.brush.handle import Handle, Shape, area, spun, swelling
 from solver.brush.listed import draw_listed
 from solver.brush.pushes import Pushes
@@ -138,7 +139,7 @@ class Handles:
         self._fluid, self._warp, self._forward = fluid, warp, ForwardMap(warp)
         self._stream = fluid.device.field((fluid.grid.nx + 1, fluid.grid.ny + 1), 1, "stream function of handles")
         self._at_rest = fluid.device.field((1, 1), 4, "no motion")
-        self._brush, self._strain = Brush(fluid.device), Strain(warp)
+        self._brush, self._strain, self._distance = Brush(fluid.device), Strain(warp), Distance(fluid.device)
         # Where the points of those that have begun are, and were then; NaN for the others.
         self._places = self._starts = np.zeros((0, 2))
         self._progress = np.zeros((0, 2))  # of each the least way it has had left, and for how long that is not halved
@@ -225,8 +226,15 @@ class Handles:
         firm = np.where(is_led, np.maximum(slower, LEAST_STIFFNESS), 1.0)
         softs = self._soft[listed] + (1 / firm - 1) / self._stiffness[listed]
         soft = np.repeat(softs[pushed], 2)
+        others = np.column_stack([places, wide])[pushed[near_others]]
+        looked_at = np.concatenate([np.column_stack([places, radii]), others])
         if local_parts.any():  # this is shared out first: the fluid would else do all of it, going on by itself
+            # Beside what is thicker, or solid, the fluid does more of it.
+            local_parts = local_parts * self._probed(looked_at, self._fluid.faces())[pushed, 2]
             local, part = pushes.local_influence(places)[:, :, : len(pushed)], local_parts[:, None]
+            if self._fluid.has_solids:
+                apart = self._distance.at(self._fluid, places)
+                local *= _smoothstep(apart[:, None] / radii[pushed])[:, None, :, None]
             both = _matrix(((1 - part) * push[:, :, : len(pushed)] + part * local)[pushed])
             carried = part * solved(both, soft, wanted[pushed].ravel()).reshape(-1, 2)
             moved = np.einsum("iajb,jb->ia", local, carried)
@@ -242,11 +250,7 @@ class Handles:
         del push  # of many points it is as large as all that balancing needs
         balance = Balance(influence, soft, weights, (owners[0], owners[1]), bounds)
         self._places[listed] += wanted * dt  # where to look for them
-        narrow, others = np.column_stack([places, radii]), np.column_stack([places, wide])[pushed[near_others]]
-        looked_at, drawn = (
-            np.concatenate([narrow, others]),
-            np.concatenate([pushed, len(places) + np.arange(len(others))]),
-        )
+        drawn = np.concatenate([pushed, len(places) + np.arange(len(others))])
         lead = self._lead = Lead(
             places, radii, pushed, pushes, looked_at, drawn, rings, loops, balance, wanted, carried
         )
@@ -266,12 +270,10 @@ class Handles:
         fluid, lead, self._lead = self._fluid, self._lead, None  # of many points it is large
         if lead is None or not lead.local.any():
             return
-        carry, viscosities = fluid.device.pass_("brush/handle_carry.frag"), self._probed(lead, fluid.faces())[:, 3]
-        places, radii, viscosities = (each[lead.pushed] for each in (lead.places, lead.radii, viscosities))
-        listed = places, radii, viscosities, lead.local
-        fluid.local.add(
-            lambda field: draw_listed(fluid.device, carry, field, fluid.grid, *listed, viscosity=fluid.viscosity)
-        )
+        solids: dict[str, Any] = {"apart": self._distance.of(fluid)} if fluid.has_solids else {}
+        carry = fluid.device.pass_("brush/handle_carry.frag", **({"SOLIDS": 1} if solids else {}))
+        listed = lead.places[lead.pushed], lead.radii[lead.pushed], lead.local
+        fluid.local.add(lambda field: draw_listed(fluid.device, carry, field, fluid.grid, *listed, **solids))
 
     # -- what it looks at -------------------------------------------------------------------------------------------
 
@@ -372,7 +374,7 @@ class Handles:
 
     def release(self) -> None:
         """Free the textures."""
-        for thing in (self._stream, self._at_rest, self._forward, self._brush, self._strain):
+        for thing in (self._stream, self._at_rest, self._forward, self._brush, self._strain, self._distance):
             thing.release()
 
     # -- where they are ---------------------------------------------------------------------------------------------
@@ -532,10 +534,10 @@ class Handles:
         )
         handles.release()
 
-    def _probed(self, lead: Lead, velocity: Field) -> np.ndarray:
-        """Where it is looked at for them: velocity, the part that a brush may do, viscosity; (n + w, 4) float64."""
+    def _probed(self, looked_at: np.ndarray, velocity: Field) -> np.ndarray:
+        """At places with radii, (n, 3): velocity, the part that a brush may do, viscosity; (n, 4) float64."""
         fluid, device = self._fluid, self._fluid.device
-        listed = lead.looked_at - [*fluid.grid.origin, 0.0]
+        listed = looked_at - [*fluid.grid.origin, 0.0]
         handles = device.upload(listed[None].astype(np.float32), "handles")
         found = Field(device, handles.size, 4, "fluid at the handles", cleared=False)
         inputs: dict[str, Any] = {
@@ -561,7 +563,7 @@ class Handles:
         if not len(lead.places):
             return
         fluid, grid = self._fluid, self._fluid.grid
-        found = self._probed(lead, faces)
+        found = self._probed(lead.looked_at, faces)
         missing = lead.wanted - found[: len(lead.places), :2]
         for loop in lead.loops:  # the fluid swells by itself: (H4)
             arms = lead.places[loop] - lead.places[loop].mean(axis=0)

@@ -61,8 +61,8 @@ class Pushes:
 
     def draw(self, device: Device, shader: Pass, target: Field, forces: np.ndarray) -> None:
         """Add what a shader draws of them, with forces (m, 2), whatever the viscosity; see `draw_listed`."""
-        each = np.zeros(len(self._numbers)), self._mirrors * forces[self._numbers]
-        draw_listed(device, shader, target, self._grid, self._middles, self._radii, *each)
+        vectors = self._mirrors * forces[self._numbers]
+        draw_listed(device, shader, target, self._grid, self._middles, self._radii, vectors)
 
     def _at(self, places: np.ndarray, matrices: Callable[..., tuple[np.ndarray, np.ndarray, np.ndarray]]) -> np.ndarray:
         """What all images do at places (n, 2), from the entries of each one's matrix there, some places at a time."""
