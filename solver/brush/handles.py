@@ -217,7 +217,7 @@ class Handles:
         slower = _of_each(
             np.minimum, self._slower(strain_read(), listed), rows
         )  # a whole goes as slowly as its slowest
-        slower = np.repeat(slower * self._progressing(active, targets, dt), counts)
+        slower = np.repeat(slower * self._progressing(active, targets, time, dt), counts)
         wanted, growths = self._wanted(active, slower, targets, dt)
         for which, tip, local in swelling_tips:
             self._brush.expand(self._fluid, tip, (1 - local) * growths[which])
@@ -307,26 +307,33 @@ class Handles:
 
     @property
     def halts(self) -> list[str | None]:
-        """Why each comes no nearer to where it is led; None if it does.
+        """Why each is not where it is led; None if that is less than a texel of the map away.
 
-        "outside": nothing of it lies in the picture. "edge": its goal is farther than a line goes beside the picture's
-        edge. "strain": the map around it slows it down so far that it would let go by that alone. It has let go: "at
-        odds" where others are held, "soft" where it leads with less than all its stiffness, else "alone".
+        "outside": nothing of it lies in the picture. "waiting": it has not begun. "over": its end has come. "edge": its
+        goal is farther than a line goes beside the picture's edge. "strain": the map around it slows it down so far
+        that it would let go by that alone. It has let go: "at odds" where others are held, "soft" where it leads with
+        less than all its stiffness, else "alone". "under way": its goal is. "late": that rests, and it comes nearer.
         """
         found = list[str | None]()
         if not self._shapes:
             return found
         slower = self._slower(self._strain.around(self._located_or_waiting(), self._radii), np.arange(len(self._at)))
-        for shape, rows, (_, waited) in zip(self._shapes, self._rows, self._progress, strict=True):
+        near, time, lefts = 1 / max(self._warp.size), self._fluid.time, self.left(math.inf, 1.0)
+        for shape, rows, (_, waited), (_, left) in zip(self._shapes, self._rows, self._progress, lefts, strict=True):
             starts = self._starts[rows]
-            if np.isnan(starts).any():
-                found.append(None if shape.is_in_picture else "outside")
+            if not shape.is_in_picture:
+                found.append("outside")
+            elif np.isnan(starts).any():
+                found.append("waiting")
+            elif shape.handle.end < time:
+                found.append("over")
             elif shape.handle.points and short_of_edges(starts, shape.due(starts, math.inf, 1.0), shape.extent) > FOUND:
                 found.append("edge")
             else:
                 is_strained = slower[rows].min() * RATE * PATIENCE < math.log(2)  # (H1): no half in that time
                 let_go = "at odds" if len(self.handles) > 1 else "soft" if shape.handle.stiffness < 1 else "alone"
-                found.append("strain" if is_strained else let_go if waited > PATIENCE else None)
+                on_way = "under way" if time < shape.handle.last else "late" if left > near else None
+                found.append("strain" if is_strained else let_go if waited > PATIENCE else on_way)
         return found
 
     def left(self, time: float, dt: float) -> list[tuple[np.ndarray, float]]:
@@ -456,10 +463,12 @@ class Handles:
                 swelling_tips.append((which, tip, shape.handle.local))
         return rings, loops, swelling_tips, np.flatnonzero(is_pushed)
 
-    def _progressing(self, active: list[int], targets: Targets, dt: float) -> np.ndarray:
-        """1 for each of these handles; 0 for what comes no nearer to its goal, as long as nobody's goal moves."""
-        if np.abs(targets.then - targets.now).max() > FOUND * dt:
-            self._progress[active] = np.inf, 0.0
+    def _progressing(self, active: list[int], targets: Targets, time: float, dt: float) -> np.ndarray:
+        """1 for each of these handles; 0 for what comes no nearer to its goal, as long as that rests."""
+        anew = ~self._are_away(targets)
+        anew |= _of_each(np.maximum, np.abs(targets.then - targets.now).max(axis=1), targets.rows) > FOUND * dt
+        anew |= any(abs(handle.last - time) <= dt / 2 for handle in self.handles)  # it has driven others about till now
+        self._progress[np.array(active)[anew]] = np.inf, 0.0
         least, waited = self._progress[active].T
         nearer = targets.remaining < least / 2
         least, waited = np.where(nearer, targets.remaining, least), np.where(nearer, 0.0, waited + dt)

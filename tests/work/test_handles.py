@@ -285,7 +285,7 @@ def test_that_the_map_bears_no_more_is_told_and_what_may_mend_it(device: Device)
 
 
 @pytest.mark.parametrize(
-    ("det", "said"), [(0.88, "where it is led"), (0.82, "the picture around it is bent as far as it bears")]
+    ("det", "said"), [(0.88, "its way is not over yet"), (0.82, "the picture around it is bent as far as it bears")]
 )
 def test_a_map_that_only_slows_a_handle_down_does_not_keep_it_from_its_goal(device: Device, det: float, said: str):
     """Bent so that it goes .74 as fast, and .07 as fast."""
@@ -403,7 +403,7 @@ def test_what_lets_go_by_itself_is_not_said_to_be_in_another_s_way(device: Devic
 
 
 def test_only_what_a_fit_leads_is_told_of_it(device: Device):
-    """No pin, nothing that has let go; and what has not begun halts for no reason."""
+    """No pin, nothing that has let go, nor what has not begun."""
     led = led_to([0.4, 0.5], [0.6, 0.5])
     replay = replay_of(
         device, handle=[led, led | {"end": 0.0}, led | {"start": 5.0}], pin=[{"at": [0.5, 0.5]}],
@@ -416,17 +416,35 @@ def test_only_what_a_fit_leads_is_told_of_it(device: Device):
     said = {label: sentence.partition("is led")[2] for label, sentence in unmet(replay, -1.0)}
     bent = ": the picture around it is bent as far as it bears"
     fit = "; Fit leads all anew, which may bring it nearer"
-    assert said == {"handle[1]": bent + fit, "handle[2]": "", "handle[3]": "", "pin[1]": bent}
+    over, waiting = ": it has let go by now", ": it has not begun"
+    assert said == {"handle[1]": bent + fit, "handle[2]": over, "handle[3]": waiting, "pin[1]": bent}
     replay.release()
 
 
-def test_handles_of_which_none_has_begun_have_no_reason(device: Device):
+def test_handles_of_which_none_has_begun_say_so(device: Device):
     late = led_to([0.4, 0.5], [0.6, 0.5], start=5.0)
     replay = replay_of(device, handle=[late], fluid={"grid": 16}, duration=0.1)
     replay.advance()
     ((_, said),) = unmet(replay, ARRIVED)
-    assert said.endswith("away from where it is led")
+    assert said.endswith("away from where it is led: it has not begun")
     replay.release()
+
+
+def test_what_comes_no_nearer_lets_go_while_others_are_led(device: Device):
+    """And what is on its way, has just arrived or waits is told as that."""
+    two = [Handle((0.25, 0.25), (x, 0.25), RADIUS, duration=0.1) for x in (0.15, 0.35)]
+    one = Handle((0.7, 0.7), (0.75, 0.7), RADIUS, duration=3.0)
+    grid = Grid(32, 32)
+    fluid, warp = Fluid(device, grid), WarpMap(device, grid, (128, 128))
+    fluid.set_viscosity(0.3)
+    handles = Handles(fluid, warp, [*two, one, Handle((0.7, 0.3), radius=0.1), Handle((0.3, 0.7), start=9.0)])
+    for _ in range(60):
+        handles.advance(DT)
+    assert handles.halts == ["at odds", "at odds", "under way", None, "waiting"]
+    for _ in range(60):
+        handles.advance(DT)
+    assert handles.halts == ["at odds", "at odds", None, None, "waiting"]
+    assert handles.away[2] < ARRIVED
 
 
 def test_a_fluid_handle_beside_local_ones_arrives(device: Device):
