@@ -36,7 +36,7 @@ class Balance:
         self._influence, self._soft, self._shares, self._owners = influence, soft, shares, owners
         self._bounds = np.concatenate([np.repeat(bounds, 2), np.full(len(shares) - 2 * len(bounds), np.inf)])
         self._pushes = 2 * len(bounds)
-        self._of_all = system(influence, soft, shares)
+        self._of_all = _system(influence, soft, shares)
 
     def strengths(self, wanted: np.ndarray, parts: np.ndarray | float = 1.0) -> np.ndarray:
         """Of all unknowns, (k,), for what is wanted, (n,), of each a part, (k,), as it is then no longer balanced."""
@@ -45,11 +45,11 @@ class Balance:
 
     def _each_within(self, wanted: np.ndarray) -> np.ndarray:
         """The same, every push within its bound, however many lie on one another."""
-        found = self._solved(self._of_all, wanted)
+        found = solved(self._influence, self._soft, wanted, self._shares, self._of_all)
         if self._over(found).max(initial=0.0) <= 1:
             return found
         wanted, shares = self._as_one(wanted), self._shares
-        found = self._solved(self._of_all, wanted)
+        found = solved(self._influence, self._soft, wanted, self._shares, self._of_all)
         count, unknowns = self._influence.shape
         for _ in range(min(ROUNDS, MOST_WORK // max(count * count * unknowns, 1))):
             over = self._over(found)
@@ -87,9 +87,6 @@ class Balance:
             wanted[mine] /= max(self._over(alone, own).max(initial=0.0), 1.0)
         return wanted
 
-    def _solved(self, matrix: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-        return self._shares * (np.linalg.solve(matrix, wanted) @ self._influence)
-
     def _over(self, found: np.ndarray, which: np.ndarray | slice = slice(None)) -> np.ndarray:
         """How many times its bound each of some unknowns is."""
         bounds, over = self._bounds[which], np.zeros(len(found))
@@ -98,7 +95,7 @@ class Balance:
         return over
 
 
-def system(influence: np.ndarray, soft: np.ndarray, shares: np.ndarray | float = 1.0) -> np.ndarray:
+def _system(influence: np.ndarray, soft: np.ndarray, shares: np.ndarray | float = 1.0) -> np.ndarray:
     """K W K' + diag(soft) of (H3)."""
     half = np.sqrt(shares) * influence
     matrix = half @ half.T  # numpy computes one half of what is symmetric so
@@ -106,6 +103,13 @@ def system(influence: np.ndarray, soft: np.ndarray, shares: np.ndarray | float =
     return matrix
 
 
-def solved(influence: np.ndarray, soft: np.ndarray, wanted: np.ndarray, shares: np.ndarray | float = 1.0) -> np.ndarray:
-    """W K' times the inverse of `system`, times what is wanted."""
-    return shares * (np.linalg.solve(system(influence, soft, shares), wanted) @ influence)
+def solved(
+    influence: np.ndarray,
+    soft: np.ndarray,
+    wanted: np.ndarray,
+    shares: np.ndarray | float = 1.0,
+    matrix: np.ndarray | None = None,
+) -> np.ndarray:
+    """W K' times the inverse of the matrix of (H3), found if it is not at hand, times what is wanted."""
+    matrix = _system(influence, soft, shares) if matrix is None else matrix
+    return shares * (np.linalg.solve(matrix, wanted) @ influence)
