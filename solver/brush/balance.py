@@ -17,12 +17,13 @@ class Balance:
 
     Args:
         influence: what each unknown does to each thing that is wanted, K, (n, k); of the unknowns the first 2 m are the
-            forces of m pushes, the others are not bounded. First of these is a narrow one for each point that is wanted
-            to move, in their order; wide ones follow.
+            forces of m pushes, the others are not bounded.
         soft: what is added to the squares of each that is wanted, (n,).
         shares: what the unknowns count there, W, (k,).
         owners: of each that is wanted, (n,), and of each unknown, (k,), the number of its handle.
         bounds: of pushes, (m,).
+        narrow: how many of the pushes, the first, are narrow ones, one at each point that is wanted to move, in their
+            order; the others are wide ones. All of them if it is not given.
     """
 
     def __init__(
@@ -32,10 +33,11 @@ class Balance:
         shares: np.ndarray,
         owners: tuple[np.ndarray, np.ndarray],
         bounds: np.ndarray,
+        narrow: int | None = None,
     ) -> None:
         self._influence, self._soft, self._shares, self._owners = influence, soft, shares, owners
         self._bounds = np.concatenate([np.repeat(bounds, 2), np.full(len(shares) - 2 * len(bounds), np.inf)])
-        self._pushes = 2 * len(bounds)
+        self._pushes, self._narrow = 2 * len(bounds), 2 * (len(bounds) if narrow is None else narrow)
         self._of_all = _system(influence, soft, shares)
 
     def strengths(self, wanted: np.ndarray, parts: np.ndarray | float = 1.0) -> np.ndarray:
@@ -67,15 +69,13 @@ class Balance:
         Of many that lie on one another each may be within its own. And where narrow ones and wide ones are opposed,
         they cancel at the points, but not around them.
         """
-        turns = self._influence.shape[1] - self._pushes
-        points = len(self._influence) - turns
-        narrow, wide = slice(0, points), slice(points, self._pushes)
+        narrow, wide = slice(0, self._narrow), slice(self._narrow, self._pushes)
 
         def over(kind: slice, bounds: np.ndarray) -> float:
-            moved = np.hypot(*(self._influence[:points, kind] @ found[kind]).reshape(-1, 2).T)
+            moved = np.hypot(*(self._influence[: self._narrow, kind] @ found[kind]).reshape(-1, 2).T)
             return float((moved / bounds).max(initial=0.0))
 
-        over_narrow = over(narrow, self._bounds[:points:2])
+        over_narrow = over(narrow, self._bounds[narrow][::2])
         return max(over_narrow, over(wide, self._bounds[wide].max())) if wide.stop > wide.start else over_narrow
 
     def _as_one(self, wanted: np.ndarray) -> np.ndarray:

@@ -248,7 +248,7 @@ class Handles:
         owners = [np.concatenate([np.repeat(numbers[each], 2), numbers[centres]]) for each in (pushed, drawn)]
         influence, bounds = _with_rings(places, pushed, push, rings), FARTHEST_STEP * np.minimum(reaches, side) / dt
         del push  # of many points it is as large as all that balancing needs
-        balance = Balance(influence, soft, weights, (owners[0], owners[1]), bounds)
+        balance = Balance(influence, soft, weights, (owners[0], owners[1]), bounds, len(pushed))
         self._places[listed] += wanted * dt  # where to look for them
         drawn = np.concatenate([pushed, len(places) + np.arange(len(others))])
         lead = self._lead = Lead(
