@@ -406,6 +406,7 @@ def fit(
     """Find handles that bring points to given places, with the least work and without a fold.
 
     Ctrl+C stops and writes the best result so far. FITTED.toml is a recipe: `fluidwarp render FITTED.toml` plays it.
+    Pairs that are missed are told, and by how far; the status is then 0, as of a render whose handles stay away.
     """
     from time import monotonic
 

@@ -16,6 +16,7 @@ class Course:
         to: tuple[float, float] | None
         rotate: float | None
         scale: float | None
+        keys: tuple[tuple[float, float, float], ...]
         turned: tuple[tuple[float, float, float], ...]
 
     @property
@@ -32,3 +33,8 @@ class Course:
     def upright(self) -> float:
         """The seconds at which it has made its first turn, and `turned` may begin."""
         return self.start if self.rotate is None and self.scale is None else self.start + self.duration
+
+    @property
+    def last(self) -> float:
+        """The seconds from which on it only stays."""
+        return max(self.keys[-1][0] if self.keys else self.ready, self.turned[-1][0] if self.turned else self.upright)

@@ -171,11 +171,6 @@ class RecipeHandle(_Led, Course):
                 )
         return self
 
-    @property
-    def last(self) -> float:
-        """The seconds from which on it only stays."""
-        return max(self.keys[-1][0] if self.keys else self.ready, self.turned[-1][0] if self.turned else self.upright)
-
     def turn_key(self, tick: int, dt: float) -> Turn:
         """The last key of its turn and size up to a tick, or that of its first turn."""
         keys = (self.upright, self.rotate or 0.0, self.scale or 1.0), *self.turned

@@ -14,7 +14,7 @@ from solver.warp.inverse import ForwardMap
 
 Line = tuple[Point, ...]
 FROZEN = "what it holds is frozen"
-HALTED = {  # why a handle or a pin halts, by `Handles.halts`
+HALTED = {  # why a handle or a pin is not where it is led, by `Handles.halts`
     "strain": "the picture around it is bent as far as it bears",
     "frozen": "the picture between it and what is frozen is bent as far as it bears",
     "at odds": "what others hold is in its way",
@@ -22,9 +22,15 @@ HALTED = {  # why a handle or a pin halts, by `Handles.halts`
     "alone": "the fluid brings it no nearer",
     "edge": "what is at the picture's edge stays there",
     "outside": "it is outside the picture",
+    "waiting": "it has not begun",
+    "over": "it has let go by now",
+    "under way": "its way is not over yet",
+    "late": "it is still on its way",
+    None: "that is less than a pixel",
 }
 FIT = "Fit"  # what the history calls an edit by a fit
 ANEW = "; Fit leads all anew, which may bring it nearer"
+HELPED = ("strain", "frozen", "at odds", "soft", "alone")  # where it may
 
 
 @dataclass(frozen=True)
@@ -121,19 +127,13 @@ def unmet(replay: Replay, within: float, is_fitted: bool = False) -> Iterator[tu
         if not far <= within:
             held = points if led.points else points[:1]
             columns, rows = np.clip(held / replay.grid.spacing, 0, np.array(replay.grid.size) - 1).astype(int).T
-            why = ""
-            if solid[rows, columns].any():
-                why = f": {FROZEN}"
-            elif halt and led.is_in_force(max(replay.tick - 1, 0), replay.recipe.fluid.dt):
-                if halt == "strain" and _nearest_of(solid, replay, held) < led.radius:
-                    halt = "frozen"
-                # A fit leads what goes somewhere, and leaves pins as they are.
-                helps = (
-                    halt not in ("edge", "outside") and isinstance(led, RecipeHandle) and led.is_led and not is_fitted
-                )
-                why = f": {HALTED[halt]}{ANEW if helps else ''}"
+            if halt == "strain" and _nearest_of(solid, replay, held) < led.radius:
+                halt = "frozen"
+            # A fit leads what goes somewhere, and leaves pins as they are.
+            helps = halt in HELPED and isinstance(led, RecipeHandle) and led.is_led and not is_fitted
+            why = FROZEN if solid[rows, columns].any() else f"{HALTED[halt]}{ANEW if helps else ''}"
             pixels = far * max(replay.pictures.source.width, replay.pictures.source.height)
-            yield label, f"{label} is {pixels:.3g} pixels ({far:.3g} longer sides) away from where it is led{why}"
+            yield label, f"{label} is {pixels:.3g} pixels ({far:.3g} longer sides) away from where it is led: {why}"
 
 
 def _nearest_of(solid: np.ndarray, replay: Replay, places: np.ndarray) -> float:

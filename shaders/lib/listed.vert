@@ -1,5 +1,5 @@
 // The square that each brush out of a list reaches over, with a cell to spare, as two triangles.
-// u_brushes: two texels each: x, y (from the grid's corner), radius (lengths), viscosity at the tip (lengths^2 / s); then what
+// u_brushes: two texels each: x, y (from the grid's corner), radius (lengths), 0; then what
 // it does, a vector (lengths / s); u_spacing: sides of a cell, lengths; u_texels: of the target, across and down.
 uniform sampler2D u_brushes;
 uniform vec2 u_spacing;

@@ -17,12 +17,13 @@ class Balance:
 
     Args:
         influence: what each unknown does to each thing that is wanted, K, (n, k); of the unknowns the first 2 m are the
-            forces of m pushes, the others are not bounded. First of these is a narrow one for each point that is wanted
-            to move, in their order; wide ones follow.
+            forces of m pushes, the others are not bounded.
         soft: what is added to the squares of each that is wanted, (n,).
         shares: what the unknowns count there, W, (k,).
         owners: of each that is wanted, (n,), and of each unknown, (k,), the number of its handle.
         bounds: of pushes, (m,).
+        narrow: how many of the pushes, the first, are narrow ones, one at each point that is wanted to move, in their
+            order; the others are wide ones. All of them if it is not given.
     """
 
     def __init__(
@@ -32,24 +33,25 @@ class Balance:
         shares: np.ndarray,
         owners: tuple[np.ndarray, np.ndarray],
         bounds: np.ndarray,
+        narrow: int | None = None,
     ) -> None:
         self._influence, self._soft, self._shares, self._owners = influence, soft, shares, owners
         self._bounds = np.concatenate([np.repeat(bounds, 2), np.full(len(shares) - 2 * len(bounds), np.inf)])
-        self._pushes = 2 * len(bounds)
-        self._of_all = system(influence, soft, shares)
+        self._pushes, self._narrow = 2 * len(bounds), 2 * (len(bounds) if narrow is None else narrow)
+        self._of_all = _system(influence, soft, shares)
 
-    def strengths(self, wanted: np.ndarray) -> np.ndarray:
-        """Of all unknowns, (k,), for what is wanted, (n,)."""
-        found = self._each_within(wanted)
+    def strengths(self, wanted: np.ndarray, parts: np.ndarray | float = 1.0) -> np.ndarray:
+        """Of all unknowns, (k,), for what is wanted, (n,), of each a part, (k,), as it is then no longer balanced."""
+        found = parts * self._each_within(wanted)
         return found / max(self._over_together(found), 1.0)
 
     def _each_within(self, wanted: np.ndarray) -> np.ndarray:
         """The same, every push within its bound, however many lie on one another."""
-        found = self._solved(self._of_all, wanted)
+        found = solved(self._influence, self._soft, wanted, self._shares, self._of_all)
         if self._over(found).max(initial=0.0) <= 1:
             return found
         wanted, shares = self._as_one(wanted), self._shares
-        found = self._solved(self._of_all, wanted)
+        found = solved(self._influence, self._soft, wanted, self._shares, self._of_all)
         count, unknowns = self._influence.shape
         for _ in range(min(ROUNDS, MOST_WORK // max(count * count * unknowns, 1))):
             over = self._over(found)
@@ -67,15 +69,13 @@ class Balance:
         Of many that lie on one another each may be within its own. And where narrow ones and wide ones are opposed,
         they cancel at the points, but not around them.
         """
-        turns = self._influence.shape[1] - self._pushes
-        points = len(self._influence) - turns
-        narrow, wide = slice(0, points), slice(points, self._pushes)
+        narrow, wide = slice(0, self._narrow), slice(self._narrow, self._pushes)
 
         def over(kind: slice, bounds: np.ndarray) -> float:
-            moved = np.hypot(*(self._influence[:points, kind] @ found[kind]).reshape(-1, 2).T)
+            moved = np.hypot(*(self._influence[: self._narrow, kind] @ found[kind]).reshape(-1, 2).T)
             return float((moved / bounds).max(initial=0.0))
 
-        over_narrow = over(narrow, self._bounds[:points:2])
+        over_narrow = over(narrow, self._bounds[narrow][::2])
         return max(over_narrow, over(wide, self._bounds[wide].max())) if wide.stop > wide.start else over_narrow
 
     def _as_one(self, wanted: np.ndarray) -> np.ndarray:
@@ -87,9 +87,6 @@ class Balance:
             wanted[mine] /= max(self._over(alone, own).max(initial=0.0), 1.0)
         return wanted
 
-    def _solved(self, matrix: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-        return self._shares * (np.linalg.solve(matrix, wanted) @ self._influence)
-
     def _over(self, found: np.ndarray, which: np.ndarray | slice = slice(None)) -> np.ndarray:
         """How many times its bound each of some unknowns is."""
         bounds, over = self._bounds[which], np.zeros(len(found))
@@ -98,7 +95,7 @@ class Balance:
         return over
 
 
-def system(influence: np.ndarray, soft: np.ndarray, shares: np.ndarray | float = 1.0) -> np.ndarray:
+def _system(influence: np.ndarray, soft: np.ndarray, shares: np.ndarray | float = 1.0) -> np.ndarray:
     """K W K' + diag(soft) of (H3)."""
     half = np.sqrt(shares) * influence
     matrix = half @ half.T  # numpy computes one half of what is symmetric so
@@ -106,6 +103,13 @@ def system(influence: np.ndarray, soft: np.ndarray, shares: np.ndarray | float =
     return matrix
 
 
-def solved(influence: np.ndarray, soft: np.ndarray, wanted: np.ndarray, shares: np.ndarray | float = 1.0) -> np.ndarray:
-    """W K' times the inverse of `system`, times what is wanted."""
-    return shares * (np.linalg.solve(system(influence, soft, shares), wanted) @ influence)
+def solved(
+    influence: np.ndarray,
+    soft: np.ndarray,
+    wanted: np.ndarray,
+    shares: np.ndarray | float = 1.0,
+    matrix: np.ndarray | None = None,
+) -> np.ndarray:
+    """W K' times the inverse of the matrix of (H3), found if it is not at hand, times what is wanted."""
+    matrix = _system(influence, soft, shares) if matrix is None else matrix
+    return shares * (np.linalg.solve(matrix, wanted) @ influence)

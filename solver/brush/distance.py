@@ -16,15 +16,25 @@ class Distance:
     def __init__(self, device: Device) -> None:
         self._fields = FieldPool(device, "distance")
         self._of: tuple[Grid, np.ndarray] | None = None
+        self._found = np.zeros((1, 1), np.float32)
 
     def of(self, fluid: Scheme) -> Field:
         """Of the cells of a fluid that has some closed."""
         closed, grid = fluid.closed, fluid.grid
         field = self._fields.get("closed", grid.size, 1)
         if self._of is None or self._of[0] != grid or not np.array_equal(self._of[1], closed):
-            field.set(distances(closed, grid))
+            self._found = distances(closed, grid)
+            field.set(self._found)
             self._of = grid, closed
         return field
+
+    def at(self, fluid: Scheme, places: np.ndarray) -> np.ndarray:
+        """Of places, (n, 2) in longer sides, between the middles of cells; (n,)."""
+        from scipy import ndimage
+
+        self.of(fluid)
+        cells = (places - fluid.grid.origin) / fluid.grid.spacing - 0.5
+        return ndimage.map_coordinates(self._found, cells.T[::-1], order=1, mode="nearest")
 
     def release(self) -> None:
         """Free the textures."""

@@ -14,6 +14,7 @@ import numpy as np
 
 from solver.brush.balance import Balance, solved
 from solver.brush.brush import Brush
+from solver.brush.distance import Distance
 from solver.brush.handle import Handle, Shape, area, spun, swelling
 from solver.brush.listed import draw_listed
 from solver.brush.pushes import Pushes
@@ -98,7 +99,8 @@ class Lead(NamedTuple):
         places, radii: of all of them, (n, 2) and (n,).
         pushed: the numbers of those that are pushed, p of them.
         pushes: m of them, one at each that is pushed, and some wide ones.
-        drawn: of each push the number of its point, (m,).
+        looked_at: where the fluid is looked at, and how far around: at all points, then at wide pushes, (n + w, 3).
+        drawn: of each push its number among these, (m,).
         rings: r of them.
         loops: which of them are closed lines.
         balance: what gives the strengths of pushes and of turns of rings, 2 m + r, for what the pushed and rings lack,
@@ -111,6 +113,7 @@ class Lead(NamedTuple):
     radii: np.ndarray
     pushed: np.ndarray
     pushes: Pushes
+    looked_at: np.ndarray
     drawn: np.ndarray
     rings: list[Ring]
     loops: list[slice]
@@ -135,10 +138,8 @@ class Handles:
         check_type("what handles look at", warp, WarpMap)
         self._fluid, self._warp, self._forward = fluid, warp, ForwardMap(warp)
         self._stream = fluid.device.field((fluid.grid.nx + 1, fluid.grid.ny + 1), 1, "stream function of handles")
-        self._thickest = fluid.device.field(self._stream.size, 1, "viscosity at the nodes")
-        self._part = fluid.device.field((1, 1), 1, "a factor of handles")
-        self._motion = fluid.device.field((1, 1), 4, "motion at a handle")
-        self._brush, self._strain = Brush(fluid.device), Strain(warp)
+        self._at_rest = fluid.device.field((1, 1), 4, "no motion")
+        self._brush, self._strain, self._distance = Brush(fluid.device), Strain(warp), Distance(fluid.device)
         # Where the points of those that have begun are, and were then; NaN for the others.
         self._places = self._starts = np.zeros((0, 2))
         self._progress = np.zeros((0, 2))  # of each the least way it has had left, and for how long that is not halved
@@ -216,7 +217,7 @@ class Handles:
         slower = _of_each(
             np.minimum, self._slower(strain_read(), listed), rows
         )  # a whole goes as slowly as its slowest
-        slower = np.repeat(slower * self._progressing(active, targets, dt), counts)
+        slower = np.repeat(slower * self._progressing(active, targets, time, dt), counts)
         wanted, growths = self._wanted(active, slower, targets, dt)
         for which, tip, local in swelling_tips:
             self._brush.expand(self._fluid, tip, (1 - local) * growths[which])
@@ -225,8 +226,15 @@ class Handles:
         firm = np.where(is_led, np.maximum(slower, LEAST_STIFFNESS), 1.0)
         softs = self._soft[listed] + (1 / firm - 1) / self._stiffness[listed]
         soft = np.repeat(softs[pushed], 2)
+        others = np.column_stack([places, wide])[pushed[near_others]]
+        looked_at = np.concatenate([np.column_stack([places, radii]), others])
         if local_parts.any():  # this is shared out first: the fluid would else do all of it, going on by itself
+            # Beside what is thicker, or solid, the fluid does more of it.
+            local_parts = local_parts * self._probed(looked_at, self._fluid.faces())[pushed, 2]
             local, part = pushes.local_influence(places)[:, :, : len(pushed)], local_parts[:, None]
+            if self._fluid.has_solids:
+                apart = self._distance.at(self._fluid, places)
+                local *= _smoothstep(apart[:, None] / radii[pushed])[:, None, :, None]
             both = _matrix(((1 - part) * push[:, :, : len(pushed)] + part * local)[pushed])
             carried = part * solved(both, soft, wanted[pushed].ravel()).reshape(-1, 2)
             moved = np.einsum("iajb,jb->ia", local, carried)
@@ -240,30 +248,32 @@ class Handles:
         owners = [np.concatenate([np.repeat(numbers[each], 2), numbers[centres]]) for each in (pushed, drawn)]
         influence, bounds = _with_rings(places, pushed, push, rings), FARTHEST_STEP * np.minimum(reaches, side) / dt
         del push  # of many points it is as large as all that balancing needs
-        balance = Balance(influence, soft, weights, (owners[0], owners[1]), bounds)
+        balance = Balance(influence, soft, weights, (owners[0], owners[1]), bounds, len(pushed))
         self._places[listed] += wanted * dt  # where to look for them
-        lead = self._lead = Lead(places, radii, pushed, pushes, drawn, rings, loops, balance, wanted, carried)
+        drawn = np.concatenate([pushed, len(places) + np.arange(len(others))])
+        lead = self._lead = Lead(
+            places, radii, pushed, pushes, looked_at, drawn, rings, loops, balance, wanted, carried
+        )
         self._fluid.impulse.add(lambda faces: self._give(lead, faces))
 
     def make_up(self, velocity: Field) -> None:
         """After viscosity, before the projection: add to a velocity on MAC faces what is still lacking.
 
-        For `steer` of `Scheme.step`. Spares what is thicker than at each handle, as `Brush.make_up`.
+        For `steer` of `Scheme.step`. Of each push less, in all its places alike, the more of it lies on what is thicker
+        than at its middle, or solid.
         """
         if self._lead is not None:
-            self._give(self._lead, velocity, ATTENUATED=1)
+            self._give(self._lead, velocity, is_sparing=True)
 
     def carry(self) -> None:
         """After a step: let what is local carry the picture until the fluid's next one."""
         fluid, lead, self._lead = self._fluid, self._lead, None  # of many points it is large
         if lead is None or not lead.local.any():
             return
-        carry, viscosities = fluid.device.pass_("brush/handle_carry.frag"), self._probed(lead, fluid.faces())[:, 3]
-        places, radii, viscosities = (each[lead.pushed] for each in (lead.places, lead.radii, viscosities))
-        listed = places, radii, viscosities, lead.local
-        fluid.local.add(
-            lambda field: draw_listed(fluid.device, carry, field, fluid.grid, *listed, viscosity=fluid.viscosity)
-        )
+        solids: dict[str, Any] = {"apart": self._distance.of(fluid)} if fluid.has_solids else {}
+        carry = fluid.device.pass_("brush/handle_carry.frag", **({"SOLIDS": 1} if solids else {}))
+        listed = lead.places[lead.pushed], lead.radii[lead.pushed], lead.local
+        fluid.local.add(lambda field: draw_listed(fluid.device, carry, field, fluid.grid, *listed, **solids))
 
     # -- what it looks at -------------------------------------------------------------------------------------------
 
@@ -297,26 +307,33 @@ class Handles:
 
     @property
     def halts(self) -> list[str | None]:
-        """Why each comes no nearer to where it is led; None if it does.
+        """Why each is not where it is led; None if that is less than a texel of the map away.
 
-        "outside": nothing of it lies in the picture. "edge": its goal is farther than a line goes beside the picture's
-        edge. "strain": the map around it slows it down so far that it would let go by that alone. It has let go: "at
-        odds" where others are held, "soft" where it leads with less than all its stiffness, else "alone".
+        "outside": nothing of it lies in the picture. "waiting": it has not begun. "over": its end has come. "edge": its
+        goal is farther than a line goes beside the picture's edge. "strain": the map around it slows it down so far
+        that it would let go by that alone. It has let go: "at odds" where others are held, "soft" where it leads with
+        less than all its stiffness, else "alone". "under way": its goal is. "late": that rests, and it comes nearer.
         """
         found = list[str | None]()
         if not self._shapes:
             return found
         slower = self._slower(self._strain.around(self._located_or_waiting(), self._radii), np.arange(len(self._at)))
-        for shape, rows, (_, waited) in zip(self._shapes, self._rows, self._progress, strict=True):
+        near, time, lefts = 1 / max(self._warp.size), self._fluid.time, self.left(math.inf, 1.0)
+        for shape, rows, (_, waited), (_, left) in zip(self._shapes, self._rows, self._progress, lefts, strict=True):
             starts = self._starts[rows]
-            if np.isnan(starts).any():
-                found.append(None if shape.is_in_picture else "outside")
+            if not shape.is_in_picture:
+                found.append("outside")
+            elif np.isnan(starts).any():
+                found.append("waiting")
+            elif shape.handle.end < time:
+                found.append("over")
             elif shape.handle.points and short_of_edges(starts, shape.due(starts, math.inf, 1.0), shape.extent) > FOUND:
                 found.append("edge")
             else:
                 is_strained = slower[rows].min() * RATE * PATIENCE < math.log(2)  # (H1): no half in that time
                 let_go = "at odds" if len(self.handles) > 1 else "soft" if shape.handle.stiffness < 1 else "alone"
-                found.append("strain" if is_strained else let_go if waited > PATIENCE else None)
+                on_way = "under way" if time < shape.handle.last else "late" if left > near else None
+                found.append("strain" if is_strained else let_go if waited > PATIENCE else on_way)
         return found
 
     def left(self, time: float, dt: float) -> list[tuple[np.ndarray, float]]:
@@ -364,7 +381,7 @@ class Handles:
 
     def release(self) -> None:
         """Free the textures."""
-        for thing in (self._stream, self._thickest, self._part, self._motion, self._forward, self._brush, self._strain):
+        for thing in (self._stream, self._at_rest, self._forward, self._brush, self._strain, self._distance):
             thing.release()
 
     # -- where they are ---------------------------------------------------------------------------------------------
@@ -446,10 +463,12 @@ class Handles:
                 swelling_tips.append((which, tip, shape.handle.local))
         return rings, loops, swelling_tips, np.flatnonzero(is_pushed)
 
-    def _progressing(self, active: list[int], targets: Targets, dt: float) -> np.ndarray:
-        """1 for each of these handles; 0 for what comes no nearer to its goal, as long as nobody's goal moves."""
-        if np.abs(targets.then - targets.now).max() > FOUND * dt:
-            self._progress[active] = np.inf, 0.0
+    def _progressing(self, active: list[int], targets: Targets, time: float, dt: float) -> np.ndarray:
+        """1 for each of these handles; 0 for what comes no nearer to its goal, as long as that rests."""
+        anew = ~self._are_away(targets)
+        anew |= _of_each(np.maximum, np.abs(targets.then - targets.now).max(axis=1), targets.rows) > FOUND * dt
+        anew |= any(abs(handle.last - time) <= dt / 2 for handle in self.handles)  # it has driven others about till now
+        self._progress[np.array(active)[anew]] = np.inf, 0.0
         least, waited = self._progress[active].T
         nearer = targets.remaining < least / 2
         least, waited = np.where(nearer, targets.remaining, least), np.where(nearer, 0.0, waited + dt)
@@ -524,10 +543,10 @@ class Handles:
         )
         handles.release()
 
-    def _probed(self, lead: Lead, velocity: Field) -> np.ndarray:
-        """At the active handles: velocity, the part that a brush may do, viscosity; (n, 4) float64."""
+    def _probed(self, looked_at: np.ndarray, velocity: Field) -> np.ndarray:
+        """At places with radii, (n, 3): velocity, the part that a brush may do, viscosity; (n, 4) float64."""
         fluid, device = self._fluid, self._fluid.device
-        listed = np.column_stack([lead.places - fluid.grid.origin, lead.radii])
+        listed = looked_at - [*fluid.grid.origin, 0.0]
         handles = device.upload(listed[None].astype(np.float32), "handles")
         found = Field(device, handles.size, 4, "fluid at the handles", cleared=False)
         inputs: dict[str, Any] = {
@@ -543,40 +562,31 @@ class Handles:
         found.release()
         return values
 
-    def _spin(self, ring: Ring, speed: float, faces: Field, found: np.ndarray, **attenuated: Any) -> None:
+    def _spin(self, ring: Ring, speed: float, faces: Field) -> None:
         """Add a turn of a ring to a velocity on MAC faces."""
-        fluid = self._fluid
-        masks: dict[str, Any] = {}
-        if attenuated:
-            self._part.clear(float(found[2]))
-            masks = {"viscosity": fluid.viscosity, "obstruction": self._part}
-        self._motion.clear(0.0, 0.0, 0.0, float(found[3]))
-        twirl, vectors = fluid.device.pass_("brush/twirl.frag", **attenuated), [(speed / ring.length, 0.0)]
-        ring.tip.draw(twirl, faces, fluid.grid, vectors, add=True, motion=self._motion, gain=1.0, **masks)
+        twirl, vectors = self._fluid.device.pass_("brush/twirl.frag"), [(speed / ring.length, 0.0)]
+        ring.tip.draw(twirl, faces, self._fluid.grid, vectors, add=True, motion=self._at_rest, gain=1.0)
 
-    def _give(self, lead: Lead, faces: Field, **attenuated: Any) -> None:
+    def _give(self, lead: Lead, faces: Field, is_sparing: bool = False) -> None:
         """Add to a velocity on MAC faces what the active handles lack of the wanted one."""
         if not len(lead.places):
             return
         fluid, grid = self._fluid, self._fluid.grid
-        found = self._probed(lead, faces)
-        missing = lead.wanted - found[:, :2]
+        found = self._probed(lead.looked_at, faces)
+        missing = lead.wanted - found[: len(lead.places), :2]
         for loop in lead.loops:  # the fluid swells by itself: (H4)
             arms = lead.places[loop] - lead.places[loop].mean(axis=0)
             missing[loop] -= swelling(lead.places[loop], missing[loop]) / 2 * arms
         asked = np.concatenate([missing[lead.pushed].ravel(), _spins(missing, lead.rings)])
-        strengths, count = lead.balance.strengths(asked), 2 * len(lead.drawn)
+        of_each = np.concatenate([np.repeat(lead.drawn, 2), [ring.centre for ring in lead.rings]]).astype(int)
+        parts = found[of_each, 2] if is_sparing else 1.0
+        strengths, count = lead.balance.strengths(asked, parts), 2 * len(lead.drawn)
         forces, spins = strengths[:count].reshape(-1, 2), strengths[count:]
-        masks: dict[str, Any] = {}
-        if attenuated:
-            forces *= found[lead.drawn, 2:3]
-            masks["thickest"] = self._thickest
-            fluid.device.pass_("brush/thickest.frag")(self._thickest, viscosity=fluid.viscosity)
         for ring, spin in zip(lead.rings, spins.tolist(), strict=True):
-            self._spin(ring, spin, faces, found[ring.centre], **attenuated)
+            self._spin(ring, spin, faces)
         self._stream.clear()
-        stream = fluid.device.pass_("brush/handle_stream.frag", **attenuated)
-        lead.pushes.draw(fluid.device, stream, self._stream, found[lead.drawn, 3], forces, **masks)
+        stream = fluid.device.pass_("brush/handle_stream.frag")
+        lead.pushes.draw(fluid.device, stream, self._stream, forces)
         fluid.device.pass_("brush/curl.frag")(faces, add=True, stream=self._stream, spacing=grid.spacing)
 
 

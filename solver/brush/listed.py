@@ -22,7 +22,6 @@ def draw_listed(
     grid: Grid,
     places: np.ndarray,
     radii: np.ndarray,
-    viscosities: np.ndarray,
     vectors: np.ndarray,
     **inputs: Any,
 ) -> None:
@@ -35,12 +34,11 @@ def draw_listed(
         grid: whose corner places are counted from.
         places: their middles in the picture, (n, 2), longer sides.
         radii: how far they reach, (n,).
-        viscosities: at their tips, (n,), lengths^2 / s.
         vectors: what they do, (n, 2), lengths / s.
         inputs: what the shader reads besides.
     """
     texels = np.zeros((len(places), 2, 4))
-    texels[:, 0] = np.column_stack([places - grid.origin, radii, viscosities])
+    texels[:, 0] = np.column_stack([places - grid.origin, radii, np.zeros(len(places))])
     texels[:, 1, :2] = vectors
     brushes = device.upload(in_rows(texels, A_ROW).reshape(-1, 2 * A_ROW, 4), "brushes")
     inputs |= {"brushes": brushes, "spacing": grid.spacing, "texels": target.size}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import product
-from typing import Any
 
 import numpy as np
 
@@ -60,12 +59,10 @@ class Pushes:
 
         return self._at(places, matrices)
 
-    def draw(
-        self, device: Device, shader: Pass, target: Field, viscosities: np.ndarray, forces: np.ndarray, **inputs: Any
-    ) -> None:
-        """Add what a shader draws of them, with viscosities at their tips (m,) and forces (m, 2); see `draw_listed`."""
-        each = viscosities[self._numbers], self._mirrors * forces[self._numbers]
-        draw_listed(device, shader, target, self._grid, self._middles, self._radii, *each, **inputs)
+    def draw(self, device: Device, shader: Pass, target: Field, forces: np.ndarray) -> None:
+        """Add what a shader draws of them, with forces (m, 2), whatever the viscosity; see `draw_listed`."""
+        vectors = self._mirrors * forces[self._numbers]
+        draw_listed(device, shader, target, self._grid, self._middles, self._radii, vectors)
 
     def _at(self, places: np.ndarray, matrices: Callable[..., tuple[np.ndarray, np.ndarray, np.ndarray]]) -> np.ndarray:
         """What all images do at places (n, 2), from the entries of each one's matrix there, some places at a time."""

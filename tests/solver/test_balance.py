@@ -88,7 +88,7 @@ def test_pushes_that_lie_on_one_another_do_no_more_together_than_one_may():
     pushes = Pushes(grid, np.concatenate([places, places]), np.repeat([0.2, 0.6], 41))
     influence, bounds = pushes.influence(places).reshape(82, 164), np.repeat([1.0, 3.0], 41)
     each = np.zeros(82, int), np.zeros(164, int)
-    found = Balance(influence, np.full(82, 1e-4), np.ones(164), each, bounds).strengths(
+    found = Balance(influence, np.full(82, 1e-4), np.ones(164), each, bounds, narrow=41).strengths(
         np.random.default_rng(1).normal(size=82) * 100
     )
     assert sizes(found).max() <= 3

@@ -27,7 +27,7 @@ def at_faces(influence: list[np.ndarray]) -> list[np.ndarray]:
 
 def test_pushes_flow_as_they_are_reckoned_to(device: Device):
     pushes, stream = Pushes(GRID, PLACES, RADII), device.field((129, 97), 1)
-    pushes.draw(device, device.pass_("brush/handle_stream.frag"), stream, np.ones(4), FORCES)
+    pushes.draw(device, device.pass_("brush/handle_stream.frag"), stream, FORCES)
     velocity = device.field(GRID.size, 2)
     device.pass_("brush/curl.frag")(velocity, stream=stream, spacing=GRID.spacing)
     assert np.abs(np.concatenate([stream.get()[[0, -1]].ravel(), stream.get()[:, [0, -1]].ravel()])).max() < 1e-6
@@ -36,10 +36,8 @@ def test_pushes_flow_as_they_are_reckoned_to(device: Device):
 
 
 def test_what_is_local_of_handles_is_carried_as_it_is_reckoned(device: Device):
-    pushes, motion, viscosity = Pushes(GRID, PLACES, RADII), device.field(GRID.size, 2), device.field(GRID.size, 1)
-    viscosity.clear(0.5)
-    carry, of_each = device.pass_("brush/handle_carry.frag"), (PLACES, RADII, np.full(4, 0.5), FORCES)
-    draw_listed(device, carry, motion, GRID, *of_each, viscosity=viscosity)
+    pushes, motion = Pushes(GRID, PLACES, RADII), device.field(GRID.size, 2)
+    draw_listed(device, device.pass_("brush/handle_carry.frag"), motion, GRID, PLACES, RADII, FORCES)
     for axis, wanted in enumerate(at_faces([pushes.local_influence(each) for each in FACES])):
         inside = FACES[axis][:, axis] > 0  # but on the walls
         np.testing.assert_allclose(motion.get()[::7, ::7, axis].ravel()[inside], wanted[inside], atol=2e-5)

@@ -471,3 +471,15 @@ def test_what_cannot_be_fitted_ends_in_a_sentence(fluidwarp: Run, tmp_path: Path
     assert done.returncode not in (0, 70)
     assert said in done.stderr
     assert not (tmp_path / "f.toml").exists()
+
+
+def test_missed_pairs_and_handles_that_stay_away_are_told_with_status_0(fluidwarp: Run, tmp_path: Path):
+    """Of a fit and of a render alike: the result is written, and may be what is wanted."""
+    write_picture(tmp_path / "a.png", PICTURE)
+    (tmp_path / "r.toml").write_text('picture = "a.png"\n' + RECIPE)
+    (tmp_path / "p.csv").write_text("20,20,30,20\n20.5,20,10,20\n")
+    fit = fluidwarp(tmp_path, "fit", "r.toml", "--pairs", "p.csv", "-o", "f.toml", "--evaluations", "1")
+    render = fluidwarp(tmp_path, "render", "f.toml", "-o", "f.png")
+    for done, said in ((fit, "pixels from where it should be"), (render, "away from where it is led: ")):
+        assert done.returncode == 0
+        assert said in done.stderr
