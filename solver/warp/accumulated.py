@@ -64,7 +64,7 @@ def map_size(grid: Grid, picture: tuple[int, int], largest: int) -> tuple[int, i
 class AccumulatedMap:
     """A displacement of the whole picture, RG32F, longer sides, redrawn tile by tile where something has moved.
 
-    Where it has become too steep for its texels it is closed, and a new one of nothing begins; a place is looked up in
+    Before it becomes too steep for its texels it is closed, and a new one of nothing begins; a place is looked up in
     the new one first, then in the closed ones, the last one closed first. These have fewer texels where as many would
     leave no room for `MOST_CLOSED`, but no fewer than `CLOSED_TEXELS` for a cell that moved them. Once there are as
     many as there may be, it goes on however steep it is. What the restore brush takes away of the closed ones is kept
@@ -168,8 +168,12 @@ class AccumulatedMap:
             pairs.append((self.undone, self._next_undone, {"undone": self.undone}))
         return pairs
 
-    def draw(self, part: float, draw: Draw) -> None:
-        """Do a `part`, 0-1, of what is planned."""
+    def draw(self, part: float, draw: Draw) -> bool:
+        """Do a `part`, 0-1, of what is planned.
+
+        Returns:
+            False if that became too steep: then nothing is taken over, and the map as it was is closed.
+        """
         before, until = self._done, math.ceil(part * (len(self._moved) + len(self._copied)))
         count, anew = len(self._moved), self._moved[before:until]
         for now, after, undone in self._pairs:
@@ -179,13 +183,18 @@ class AccumulatedMap:
         if anew:
             self._look(anew)
         self._done = max(before, until)
-        if part >= 1:
-            self.now, self._next = self._next, self.now
-            self.undone, self._next_undone = self._next_undone, self.undone
-            self._stale = set(self._moved)
-            self._moved, self._copied, self._done = [], [], 0
-            if self._may_close and self._steepness.found() > STEEPEST**2:
-                self._close()
+        if part < 1:
+            return True
+        # A submap by itself is as steep as it is: closing a map of nothing would not mend that.
+        if self._may_close and self.now.tiles and self._steepness.found() > STEEPEST**2:
+            self.forget()
+            self._close()
+            return False
+        self.now, self._next = self._next, self.now
+        self.undone, self._next_undone = self._next_undone, self.undone
+        self._stale = set(self._moved)
+        self._moved, self._copied, self._done = [], [], 0
+        return True
 
     @property
     def _closed_size(self) -> tuple[int, int]:

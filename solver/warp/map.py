@@ -42,8 +42,8 @@ class WarpMap:
 
     Two levels (the characteristic mapping method): the submap S holds what has moved lately, on the simulation's grid,
     which may be a window of the picture; the accumulated map A of the whole picture takes S in (a remap) before S is
-    bent so far that interpolating it every step would show. D(x) = S(x) + A(x + S(x)), S = 0 outside the window. Where
-    A is too steep for its texels it is closed, and another begins before it. Longer sides, RG32F at the centres of
+    bent so far that interpolating it every step would show. D(x) = S(x) + A(x + S(x)), S = 0 outside the window. Before
+    A gets too steep for its texels it is closed, and another begins before it. Longer sides, RG32F at the centres of
     cells and texels. Only tiles of A that have moved are redrawn, a few in each step. Until all are done, the submap
     being taken in, *pending*, stands between S and A; what has to be remapped meanwhile is *gathered* in a level
     between S and the pending one. Every place x + S(x) lies in the picture, and every x + D(x) there or where a map

@@ -88,10 +88,11 @@ class Remapping:
     def finish(self) -> None:
         """Take everything into the accumulated map at once."""
         if self._gathered is None:
-            self._take_in(1.0)
+            while self._pending is not None:
+                self._take_in(1.0)
         else:
-            self._begin(self.levels)
-            self._draw_anew(self.levels, 1.0)
+            while self._begin(self.levels) and not self._draw_anew(self.levels, 1.0):
+                pass
             self.drop()
 
     def drop(self) -> None:
@@ -179,8 +180,9 @@ class Remapping:
         if self._pending is None:
             return
         begun = self._begun / self._whole
-        self._draw_anew([self._pending], (part - begun) / (1 - begun))
-        if part >= 1:
+        if not self._draw_anew([self._pending], (part - begun) / (1 - begun)):
+            self._stand_by(self._pending)
+        elif part >= 1:
             self._pending.field.release()
             self._go_on()
 
@@ -190,8 +192,8 @@ class Remapping:
         if gathered is not None and not self._stand_by(gathered):
             gathered.field.release()
 
-    def _draw_anew(self, levels: list[Level], part: float) -> None:
-        """Redraw a `part` of the accumulated map's tiles that are planned for these levels."""
+    def _draw_anew(self, levels: list[Level], part: float) -> bool:
+        """Redraw a `part` of the accumulated map's tiles that are planned for these levels; False: see there."""
         fine = {"CUBIC": 1} if all(self._accumulated.is_fine(level.grid) for level in levels) else {}
         inputs = self._accumulated.own() | inputs_of(levels, self._frozen.inputs())
 
@@ -203,7 +205,7 @@ class Remapping:
                 compose = self.device.pass_("warp/compose.frag", REMAP=1, **fine, **carry, **defines)
                 compose(target, region=parts, **inputs, **undone)
 
-        self._accumulated.draw(part, draw)
+        return self._accumulated.draw(part, draw)
 
     @property
     def _whole(self) -> int:
