@@ -81,6 +81,34 @@ vec2 cubic_displacement(sampler2D displacement, vec2 p, float walled, out mat2 s
     return sum;
 }
 
+// The cubic at the corners of a rectangle as far across as `side`, in texels, from p on, where it is the polynomial at p:
+// top left and right, bottom left and right. 12 reads.
+void cubic_corners(sampler2D displacement, vec2 p, vec2 side, float walled, out vec2 corners[4]) {
+    vec2 size = vec2(textureSize(displacement, 0)), texel = 1.0 / size;
+    vec2 cell = clamp(floor(p - 0.5), vec2(1.0), size - 3.0), f = p - 0.5 - cell;
+    vec4 x = (cell.x + vec4(-0.5, 0.5, 1.5, 2.5)) * texel.x, y = (cell.y + vec4(-0.5, 0.5, 1.5, 2.5)) * texel.y;
+    vec4 cx[2], lx[2], ex[2], by[2], ly[2], ey[2];
+    for (int k = 0; k < 2; ++k) {
+        vec2 at = f + float(k) * side, there = p + float(k) * side;
+        cx[k] = cubic_lagrange(at.x);
+        lx[k] = vec4(0.0, 1.0 - at.x, at.x, 0.0);
+        ly[k] = vec4(0.0, 1.0 - at.y, at.y, 0.0);
+        by[k] = cubic_lagrange(at.y) - ly[k];
+        ex[k] = to_edges(there.x, cell.x, size.x, walled);
+        ey[k] = to_edges(there.y, cell.y, size.y, walled);
+    }
+    for (int k = 0; k < 4; ++k) corners[k] = vec2(0.0);
+    for (int j = 0; j < 4; ++j)
+        for (int i = 0; i < 4; ++i) {
+            if (i % 3 == 0 && j % 3 == 0) continue;
+            vec2 read = texture(displacement, vec2(x[i], y[j])).rg;
+            for (int k = 0; k < 4; ++k) {
+                int a = k % 2, b = k / 2;
+                corners[k] += (cx[a][i] * ly[b][j] + lx[a][i] * by[b][j]) * vec2(ex[a][i], ey[b][j]) * read;
+            }
+        }
+}
+
 // As the four, of six.
 void to_edges(float p, float cell, float count, float walled, out float weights[6]) {
     float first = walled * float(cell <= 2.0), last = walled * float(cell >= count - 4.0);

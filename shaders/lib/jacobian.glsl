@@ -8,6 +8,7 @@ struct Bend {
     vec2 moved;        // D(x)
     mat2 jacobian;     // of x + D(x)
     float determinant; // the product of the parts', which loses nothing where they shear
+    float between;     // the same, of the submaps and A what becomes of the area of A's next texel, or between its next four
 #if UNDONE > 0
     // While closed maps are followed, `moved` and `jacobian` are of where x is led to.
     vec2 from;         // before the last map that was followed
@@ -19,21 +20,34 @@ struct Bend {
 #endif
 };
 
-// 1 + grad (w S) of a submap at x + moved, w its weight; w S is added to `moved`.
-mat2 bend_of(int level, sampler2D submap, vec4 window, vec2 x, inout vec2 moved) {
-    vec2 place = x + moved, size = vec2(textureSize(submap, 0)), density = size / window.zw;
-    vec3 at = in_window(window, place);
-    mat2 slope;
-    vec2 fading;
-    float w = weight(level, submap, window, place, fading);
-    fading *= vec2(textureSize(u_accumulated, 0)) / u_picture;
-    vec2 more = cubic_displacement(submap, at.xy * size, u_walled, slope);
-    moved = within_picture(x, moved + w * more * at.z);
-    return mat2(1.0) + at.z * (w * mat2(slope[0] * density.x, slope[1] * density.y) + outerProduct(more, fading));
+// What becomes of the area of a rectangle whose corners, as those of `cubic_corners`, are moved so, in its sides: half the
+// product of its diagonals, negative where it is folded. Of three of them, what turns within it seems to fold.
+float area_of(vec2 corners[4]) {
+    vec2 down = 1.0 + corners[3] - corners[0], up = vec2(1.0, -1.0) + corners[1] - corners[2];
+    return 0.5 * (down.y * up.x - down.x * up.y);
 }
 
-// What A, or a closed map, does after that.
-void follow(sampler2D accumulated, vec2 x, inout Bend bend) {
+// What a submap does at x + moved, with its weight w.
+void bend_by(int level, sampler2D submap, vec4 window, vec2 x, inout Bend bend) {
+    vec2 place = x + bend.moved, size = vec2(textureSize(submap, 0)), density = size / window.zw;
+    vec2 texel = u_picture / vec2(textureSize(u_accumulated, 0));
+    vec3 at = in_window(window, place);
+    mat2 slope;
+    vec2 fading, corners[4];
+    float w = weight(level, submap, window, place, fading);
+    cubic_corners(submap, at.xy * size, texel * density, u_walled, corners);
+    for (int k = 0; k < 4; ++k) corners[k] *= at.z * (w + dot(fading, vec2(k % 2, k / 2))) / texel;
+    bend.between *= area_of(corners);
+    fading /= texel;
+    vec2 more = cubic_displacement(submap, at.xy * size, u_walled, slope);
+    bend.moved = within_picture(x, bend.moved + w * more * at.z);
+    mat2 next = mat2(1.0) + at.z * (w * mat2(slope[0] * density.x, slope[1] * density.y) + outerProduct(more, fading));
+    bend.determinant *= determinant(next);
+    bend.jacobian = next * bend.jacobian;
+}
+
+// What A, or a closed map, does after that; gives its own determinant.
+float follow(sampler2D accumulated, vec2 x, inout Bend bend) {
     vec2 density = vec2(textureSize(accumulated, 0)) / u_picture;
     mat2 slope;
 #if UNDONE > 0
@@ -42,13 +56,23 @@ void follow(sampler2D accumulated, vec2 x, inout Bend bend) {
 #endif
     bend.moved += cubic_displacement(accumulated, (x + bend.moved) * density, u_walled, slope);
     mat2 next = mat2(1.0) + mat2(slope[0] * density.x, slope[1] * density.y);
-    bend.determinant *= determinant(next);
     bend.jacobian = next * bend.jacobian;
+    float own = determinant(next);
+    bend.determinant *= own;
+    return own;
+}
+
+void follow_accumulated(vec2 x, inout Bend bend) {
+    vec2 density = vec2(textureSize(u_accumulated, 0)) / u_picture, corners[4];
+    ivec2 first = clamp(ivec2(floor((x + bend.moved) * density - 0.5)), ivec2(0), textureSize(u_accumulated, 0) - 2);
+    for (int k = 0; k < 4; ++k) corners[k] = texelFetch(u_accumulated, first + ivec2(k % 2, k / 2), 0).rg * density;
+    bend.between *= area_of(corners);
+    follow(u_accumulated, x, bend);
 }
 
 void follow_closed(sampler2D closed, vec2 x, inout Bend bend) {
     bend.moved = within_picture(x, bend.moved);
-    follow(closed, x, bend);
+    bend.between *= follow(closed, x, bend);
 }
 
 #if UNDONE > 0
@@ -75,7 +99,6 @@ void undo(sampler2D undone, vec2 x, inout Bend bend) {
 #endif
 
 Bend bend_at(vec2 x) {
-    mat2 next;
     Bend bend;
 #ifdef HELD
     mat2 slope;
@@ -84,7 +107,7 @@ Bend bend_at(vec2 x) {
     if (texture(u_held, x / u_picture).r > 0.9) {
         bend.moved = cubic_displacement(u_kept, on_texel(x * density), 0.0, slope);
         bend.jacobian = mat2(1.0) + mat2(slope[0] * density.x, slope[1] * density.y);
-        bend.determinant = determinant(bend.jacobian);
+        bend.determinant = bend.between = determinant(bend.jacobian);
         return bend;
     }
 #endif
@@ -94,19 +117,16 @@ Bend bend_at(vec2 x) {
     bend.bent_back = mat2(0.0);
     bend.part = 1.0;
 #endif
-    bend.jacobian = bend_of(1, u_submap, u_window, x, bend.moved);
-    bend.determinant = determinant(bend.jacobian);
+    bend.jacobian = mat2(1.0);
+    bend.determinant = bend.between = 1.0;
+    bend_by(1, u_submap, u_window, x, bend);
 #if LEVELS > 1
-    next = bend_of(2, u_second, u_second_window, x, bend.moved);
-    bend.determinant *= determinant(next);
-    bend.jacobian = next * bend.jacobian;
+    bend_by(2, u_second, u_second_window, x, bend);
 #endif
 #if LEVELS > 2
-    next = bend_of(4, u_third, u_third_window, x, bend.moved);
-    bend.determinant *= determinant(next);
-    bend.jacobian = next * bend.jacobian;
+    bend_by(4, u_third, u_third_window, x, bend);
 #endif
-    follow(u_accumulated, x, bend);
+    follow_accumulated(x, bend);
 #if UNDONE > 0
 #define FOLLOW(closed, number) if ((UNDONE >> number & 1) != 0) undo(closed, x, bend); else follow_closed(closed, x, bend);
 #else
@@ -120,7 +140,7 @@ Bend bend_at(vec2 x) {
     if (bend.part < 1.0 || bend.back != vec2(0.0) || bend.bent_back != mat2(0.0)) {
         mat2 bent = bend.bent_back + outerProduct(bend.moved, bend.fading) + bend.part * (bend.jacobian - mat2(1.0));
         bend.jacobian = mat2(1.0) + bent;
-        bend.determinant = determinant(bend.jacobian);
+        bend.determinant = bend.between = determinant(bend.jacobian);
         bend.moved = bend.back + bend.part * bend.moved;
     }
 #endif
