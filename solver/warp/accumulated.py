@@ -228,6 +228,8 @@ class AccumulatedMap:
                 resample = self.device.pass_("warp/resample.frag", CUBIC=1)
                 regions = [_resampled(tile, self.size, size) for tile in now.tiles]
                 resample(closed, region=regions, displacement=now, origin=(0.0, 0.0), step=closed.texel)
+            # Clearing the map itself would copy at once what saves hold of it.
+            self.now, self._next = self._next, self.now
             self.now.clear()
         self._drop_undone()
         self.finest = 1.0
