@@ -147,7 +147,8 @@ def name_of(one: Actor, which: Which) -> str:
     if isinstance(one, Stroke):
         return one.tool.capitalize()
     if isinstance(one, RecipeHandle | RecipePin):
-        return heading(label_of(one.kind, which[1] + 1, one.name))
+        is_pin = isinstance(one, RecipeHandle) and not one.is_led
+        return f"{heading(label_of(one.kind, which[1] + 1, one.name))}{' (pin)' * is_pin}"
     return one.name or f"{one.kind.capitalize()} force"
 
 
