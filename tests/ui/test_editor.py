@@ -52,6 +52,7 @@ from solver.resample.plan import Sampling
 from solver.resample.sampler import Sampler
 from support.commands import Run
 from support.editing import BY_KEY, Robot, export_dialog, pattern, small_project, write_foreign_map
+from support.widgets import Widgets
 
 
 def names(robot: Robot) -> list[str]:
@@ -736,7 +737,7 @@ def test_a_message_that_comes_or_goes_by_itself_is_drawn_until_it_fits(robot: Ro
     assert robot.editor.wants_frame()
 
 
-def test_saving_asks_for_a_name_and_where_the_picture_goes(robot: Robot, tmp_path: Path) -> None:
+def test_saving_asks_for_a_name_and_where_the_picture_goes(robot: Robot, tmp_path: Path, widgets: Widgets) -> None:
     robot.drag((0.3, 0.4), (0.45, 0.4))
     robot.rest()
     robot.editor.preferences.folder = str(tmp_path)
@@ -759,11 +760,9 @@ def test_saving_asks_for_a_name_and_where_the_picture_goes(robot: Robot, tmp_pat
     dialog = robot.editor.dialogs.shown[-1]
     assert isinstance(dialog, SaveDialog)
     robot.type("small")
-    rect = dialog.rect
-    robot.click(rect.x + 100, rect.y + 130)
+    widgets.click("Keep the picture inside the project")
     assert not dialog.embed
-    robot.click(dialog.rect.right - 60, dialog.rect.bottom - 36)
-    robot.frame(count=2)
+    widgets.click("Save")
     assert not robot.editor.dialogs.shown
     small = projects.load(tmp_path / "small.fluidwarp")
     assert not small.embedded

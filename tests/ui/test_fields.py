@@ -455,6 +455,8 @@ def test_print_notes_the_dots_per_inch_that_printers_ask_for(
     widgets.click("Print")
     assert dialog.job().outputs.dpi == 300
     widgets.click("EXR")
+    assert dialog.job().outputs.dpi == 300
+    widgets.click("Animation")
     assert dialog.job().outputs.dpi is None
 
 
