@@ -30,7 +30,7 @@ HALTED = {  # why a handle or a pin is not where it is led, by `Handles.halts`
     "late": "it is still on its way",
     None: "that is less than a pixel",
 }
-FAR = "it goes no farther than that"
+FAR = "its reach (radius) is too small to go that far"
 SMALL = "it reaches over only {:.2g} cells of the simulation; give it a larger reach (radius)"
 FIT = "Fit"  # what the history calls an edit by a fit
 ANEW = "fluidwarp fit leads all handles anew, which may bring them nearer"
@@ -154,8 +154,8 @@ def unmet(replay: Replay, within: float, is_fitted: bool = False) -> Iterator[Un
             why, cells = HALTED[halt], led.radius * max(replay.grid.size)
             if solid[rows, columns].any():
                 why, helped = FROZEN, False
-            elif leads_too_far(led, replay.grid.extent):  # as `objections` say, and what helps
-                why, helped = FAR, False
+            elif halt in HELPED and leads_too_far(led, replay.grid.extent):  # `objections` say what helps
+                why, helped = why if halt == "frozen" else FAR, False
             elif helped and halt in ("strain", "alone") and cells < LEAST_PER_RADIUS and led.local < 1:
                 why, helped = SMALL.format(cells), False
             pixels = far * max(replay.pictures.source.width, replay.pictures.source.height)
