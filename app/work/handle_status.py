@@ -149,14 +149,15 @@ def unmet(replay: Replay, within: float, is_fitted: bool = False) -> Iterator[Un
             columns, rows = np.clip(held / replay.grid.spacing, 0, np.array(replay.grid.size) - 1).astype(int).T
             if halt == "strain" and _nearest_of(solid, replay, held) < led.radius:
                 halt = "frozen"
+            why, cells = HALTED[halt], led.radius * max(replay.grid.size)
             # A fit leads what goes somewhere, and leaves pins as they are.
             helped = halt in HELPED and isinstance(led, RecipeHandle) and led.is_led and not is_fitted
-            why, cells = HALTED[halt], led.radius * max(replay.grid.size)
+            is_wide = cells >= LEAST_PER_RADIUS or (isinstance(led, RecipeHandle) and led.local == 1)
             if solid[rows, columns].any():
                 why, helped = FROZEN, False
             elif halt in HELPED and leads_too_far(led, replay.grid.extent):  # `objections` say what helps
                 why, helped = why if halt == "frozen" else FAR, False
-            elif helped and halt in ("strain", "alone") and cells < LEAST_PER_RADIUS and led.local < 1:
+            elif helped and halt in ("strain", "alone") and not is_wide:
                 why, helped = SMALL.format(cells), False
             pixels = far * max(replay.pictures.source.width, replay.pictures.source.height)
             said = f"{label} is {pixels:.3g} pixels ({far:.3g} longer sides) away from where it is led: {why}"

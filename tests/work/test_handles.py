@@ -377,12 +377,12 @@ def test_what_is_made_up_is_less_beside_what_is_thick_and_in_all_places_alike(co
 
 
 def test_what_is_frozen_beside_a_handle_is_told(device: Device):
-    """Farther off than it reaches it is not."""
+    """Farther off than it reaches it is not; and what is led too far would not get there with a larger reach either."""
     frozen_disc = {"kind": "path", "points": [[0.65, 0.5]], "radius": 0.05, "hardness": 1.0}
     folded = np.zeros((96, 128, 2), np.float32)
     folded[:, 64, 0] = 1.5 / 128
-    for at, between in (0.5, True), (0.35, False):
-        led = led_to([at, 0.5], [at, 0.4], radius=0.2)
+    for at, to, between in (0.5, (0.5, 0.4), True), (0.5, (0.95, 0.5), True), (0.35, (0.35, 0.4), False):
+        led = led_to([at, 0.5], [*to], radius=0.2)
         replay = replay_of(device, handle=[led], freeze=[frozen_disc], fluid={"grid": 64}, duration=0.1)
         replay.warp.set(folded)
         replay.advance()
@@ -457,7 +457,7 @@ def test_of_what_is_missed_one_remedy_is_told(
 
 
 def test_handles_of_which_none_has_begun_say_so(device: Device):
-    late = led_to([0.4, 0.5], [0.6, 0.5], start=5.0)
+    late = led_to([0.4, 0.5], [0.6, 0.5], radius=0.05, start=5.0)  # and far, which is told beside
     replay = replay_of(device, handle=[late], fluid={"grid": 16}, duration=0.1)
     replay.advance()
     ((_, said, _),) = unmet(replay, ARRIVED)
