@@ -261,6 +261,8 @@ def _bar(ui: Ui, session: Session, state: EditorState, bar: Bar, y: float, scale
     if room > (width if is_numbered else ui.px(50)):
         draw.add_text(ImVec2(x, y + ui.px(3)), ink, words)
     draw.pop_clip_rect()
+    if is_numbered and room <= width < min(scale.across(bar.stops), scale.x1) - right - ui.px(8):
+        draw.add_text(ImVec2(right + ui.px(4), y + ui.px(3)), packed(palette.text, 0.9), words)
     imgui.pop_font()
 
 
