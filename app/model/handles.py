@@ -263,8 +263,9 @@ def labelled(handles: Sequence[RecipeHandle], pins: Sequence[RecipePin]) -> list
 
 
 def in_words(said: str) -> str:
-    """What messages say, with all called as the window does: handle 1 "smile" is handle[1] "smile", Size the radius."""
-    return re.sub(r"\b(handle|pin)\[(\d+)\]", r"\1 \2", said).replace("reach (radius)", "Size")
+    """What messages say, in the window: handle 1 "smile" for handle[1] "smile", pixels alone, Size for radius."""
+    said = re.sub(r"\b(handle|pin)\[(\d+)\]", r"\1 \2", re.sub(r" \([\d.e-]+ longer sides\)", "", said))
+    return said.replace("reach (radius)", "Size").replace("fluidwarp fit leads", "Fit leads")
 
 
 def heading(said: str) -> str:
@@ -296,12 +297,13 @@ def objections(
         if outside.any():
             yield f"{way.label} reaches out of the picture: what is outside is not led"
         if not (ends := way.after[beyond & ~outside]).size and (short := way.short_of_edges(extent)) > ARRIVED:
-            yield f"{way.label} stays {short:.3g} longer sides short: what is at the picture's edge stays there"
+            more = "what is at the picture's edge stays there"
+            yield f"{way.label} stays {100 * short:.3g}% of the longer side short: {more}"
         if ends.size:
             yield f"{way.label} goes only to the picture's edge: {_shown(ends[0] / extent)} is outside the picture"
-        elif (far := _lengths(way.after - way.before).max() / way.reach) > LARGEST_LEAD:
-            more = "give it a larger reach (radius)"
-            yield f"{way.label} goes only {LARGEST_LEAD:g} times as far as it reaches, of {far:.3g} to its goal; {more}"
+        elif way.far > LARGEST_LEAD:
+            more = f"of {way.far:.3g} to its goal; give it a larger reach (radius)"
+            yield f"{way.label} goes only {LARGEST_LEAD:g} times as far as it reaches, {more}"
         if way.led.closed and _area(way.before) * _area(way.after) < 0:
             yield f"{way.label} is led inside out"
     for one, other in combinations([way for way in led if way.led.takes_hold], 2):
@@ -322,6 +324,11 @@ def objections(
                 yield f"{both} are led to nearly the same place"
             elif (apart & (_nearest(before, after) * MOST_STRETCH < close)).any():
                 yield f"{both} cross each other's way"
+
+
+def leads_too_far(led: RecipeHandle | RecipePin, extent: Point) -> bool:
+    """True if its goal is farther than it goes."""
+    return _Way("", led, extent).far > LARGEST_LEAD
 
 
 class _Way:
@@ -346,6 +353,11 @@ class _Way:
             self.after = goal + scale * laid @ turn
         rounds = ([*line, line[0]] if led.closed else line for line in lines)
         self.reach = max(led.radius, max(_lengths(np.diff(line, axis=0)).sum() for line in rounds) / LONGEST_LINE)
+
+    @property
+    def far(self) -> float:
+        """How many times as far as it reaches its farthest corner is led."""
+        return float(_lengths(self.after - self.before).max() / self.reach)
 
     def short_of_edges(self, extent: Point) -> float:
         """How far what is farthest of its line stays from where it is led within the picture."""

@@ -323,6 +323,15 @@ class Recipe(Model):
         """True if it has handles or pins."""
         return bool(self.handle or self.pin)
 
+    def lets_go(self, led: RecipeHandle | RecipePin) -> bool:
+        """True if a handle or a pin has let go before the end: what it has done is not asked of that any more."""
+        return not led.muted and led.end is not None and led.let_go <= (self.ticks - 0.5) * self.fluid.dt
+
+    @property
+    def can_fit(self) -> bool:
+        """True if it has handles that lead somewhere, and hold it to the end."""
+        return any(handle.is_led and not (handle.muted or self.lets_go(handle)) for handle in self.handle)
+
     def fluid_at(self, tick: int) -> FluidSettings:
         """The fluid's settings in force during `tick`, with all changes up to it."""
         changed: dict[str, Any] = {}

@@ -6,7 +6,7 @@ from app.model.handles import RecipeHandle, RecipePin, heading
 from app.model.tools import TOOL
 from app.ui.messages import Messages
 from app.ui.workspace import Workspace
-from app.work.handle_status import FIT
+from app.work.handle_status import ANEW, FIT
 from app.work.session import Session
 
 TOLD = 3  # sentences in a message; the inspector has all of them
@@ -32,19 +32,21 @@ class Cautions:
         session = self._workspace.session
         if session.is_painting:
             return
-        said = {each: each for each in session.objections} | session.unmet
+        unmet = session.unmet
+        said = {each: each for each in session.objections} | {label: each.said for label, each in unmet.items()}
         if session is not self._session:
             self._session, self._known, self._folds = session, set(), False
         self._look_at_folds(session)
-        new = [sentence for key, sentence in said.items() if key not in self._known]
+        new = {key: sentence for key, sentence in said.items() if key not in self._known}
         led = _led(session)
         # While it moves, or is looked at before its end, nobody can tell what will be unmet.
         self._known = self._known | said.keys() if led == self._led or session.is_moving else set(said)
         self._led = led
         history = session.document.history
         if new and history.entries[history.index].name != FIT:  # which has told what it could not meet
-            words = [f"{heading(sentence)}." for sentence in new[:TOLD]]
+            words = [f"{heading(sentence)}." for sentence in [*new.values()][:TOLD]]
             rest = [f"{len(new) - TOLD} more like these: see the inspector."] * (len(new) > TOLD)
+            rest += [f"{heading(ANEW)}."] * any(unmet[key].helped for key in new if key in unmet)
             self._messages.caution(
                 " ".join([*words, *rest]), lambda: session is self._workspace.session and _led(session) == led
             )

@@ -49,7 +49,7 @@ class Fits:
         if self.is_running:
             return
         session = self._workspace.session
-        if not any(handle.is_led and not handle.muted for handle in session.recipe.handle):
+        if not session.recipe.can_fit:
             self._messages.say("There is nothing to fit yet: drag a point to where it should go, with Handle.")
             return
         self._begin(session.recipe)

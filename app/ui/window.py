@@ -75,6 +75,7 @@ class GlfwWindow:
         glfw.window_hint(glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE)
         glfw.window_hint(glfw.OPENGL_FORWARD_COMPAT, True)
         glfw.window_hint(glfw.SCALE_TO_MONITOR, True)
+        glfw.window_hint(glfw.VISIBLE, False)  # until it has its size and place
         glfw.window_hint(glfw.SAMPLES, 0)
         glfw.window_hint(glfw.DEPTH_BITS, 0)
         glfw.window_hint_string(glfw.X11_CLASS_NAME, TITLE)
@@ -85,8 +86,12 @@ class GlfwWindow:
             raise UserError(why, NO_DISPLAY)
         glfw.make_context_current(self.handle)
         glfw.swap_interval(1)
-        glfw.set_window_size_limits(self.handle, *SMALLEST, glfw.DONT_CARE, glfw.DONT_CARE)
+        # On a screen of 200 % it has become twice as large.
+        glfw.set_window_size(self.handle, *_fitting(glfw.get_window_size(self.handle)))
+        smallest = _fitting((round(SMALLEST[0] * self.scale), round(SMALLEST[1] * self.scale)))
+        glfw.set_window_size_limits(self.handle, *smallest, glfw.DONT_CARE, glfw.DONT_CARE)
         self._go_to(place)
+        glfw.show_window(self.handle)
         self.events: list[Event] = []
         self._held = Mods()
         self._title = TITLE

@@ -35,7 +35,7 @@ from app.model.recipe import Recipe
 from app.model.timeline import Dissolve, Sentinel, Timeline, dissolved, frame_positions
 from app.progress import Progress
 from app.work.checkpoints import DEFAULT_BUDGET
-from app.work.handle_status import unmet
+from app.work.handle_status import ANEW, unmet
 from app.work.jobs import Job, MapOutput, longer_side, result_size
 from app.work.layers import resample_layers, widened
 from app.work.observation import observe
@@ -165,8 +165,11 @@ class _Export:
         """What the user should know of the last warp, and of what the output cannot hold."""
         if self.recipe.mode == "coordinates" and (distortion := self.replay.warp.statistics()).folds:
             self.pictures.notice(f"the warp folds over itself in {distortion.folds} of {distortion.places} places")
-        for _, said in unmet(self.replay, ARRIVED):
-            self.pictures.notice(said)
+        missed = list(unmet(self.replay, ARRIVED))
+        for each in missed:
+            self.pictures.notice(each.said)
+        if any(each.helped for each in missed):
+            self.pictures.notice(ANEW)
         output, clip = self.outputs.file, self.job.clip
         if output is not None and (said := unheld(output, self.job.picture, **self._along)):
             self.pictures.notice(said)

@@ -27,7 +27,6 @@ from app.model.handles import (
     MOST_SCALE,
     MOST_TURNED,
     RecipeHandle,
-    RecipePin,
     labelled,
     objections,
 )
@@ -348,7 +347,7 @@ def _aimed(device: Device, recipe: Recipe, pictures: Pictures, pairs: Pairs | No
     shapes = _shapes(recipe.handle, extent)
     at_once, starts = _starts(device, recipe, pictures, shapes, progress)
     for number, (handle, shape) in enumerate(zip(recipe.handle, shapes, strict=True)):
-        if handle.muted or _lets_go(handle, recipe):
+        if handle.muted or recipe.lets_go(handle):
             continue
         start = starts[number]
         begin, until = (start, _until(handle, recipe)) if timed else (at_once[number], inf)
@@ -381,7 +380,7 @@ def _shapes(handles: Sequence[RecipeHandle], extent: Point) -> list[Shape]:
 
 def _has_times(recipe: Recipe) -> bool:
     """True if something in it has its time: what is led after it, or beside it, is fitted there."""
-    lets_go = any(_lets_go(led, recipe) for led in (*recipe.handle, *recipe.pin))
+    lets_go = any(recipe.lets_go(led) for led in (*recipe.handle, *recipe.pin))
     return bool(recipe.stroke or recipe.change or recipe.mask or recipe.force or lets_go)
 
 
@@ -393,11 +392,6 @@ def _flows(recipe: Recipe) -> bool:
 def _anew(recipe: Recipe) -> float:
     """The seconds from which on what is led stays: when the warp is reset for the last time, or else 0."""
     return max((change.tick for change in recipe.change if change.reset_warp), default=0) * recipe.fluid.dt
-
-
-def _lets_go(led: RecipeHandle | RecipePin, recipe: Recipe) -> bool:
-    """True if a handle or a pin has let go before the end: what it has done is not asked of that any more."""
-    return not led.muted and led.end is not None and led.let_go <= (recipe.ticks - 0.5) * recipe.fluid.dt
 
 
 def _until(handle: RecipeHandle, recipe: Recipe) -> float:

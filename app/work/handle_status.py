@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
-from app.model.handles import ARRIVED, RecipeHandle, RecipePin
+from app.model.handles import ARRIVED, RecipeHandle, RecipePin, leads_too_far
 from app.model.sampling import Point
+from app.model.windows import LEAST_PER_RADIUS
 from app.work.replay import Replay
 from solver.warp.inverse import ForwardMap
 
@@ -28,8 +30,10 @@ HALTED = {  # why a handle or a pin is not where it is led, by `Handles.halts`
     "late": "it is still on its way",
     None: "that is less than a pixel",
 }
+FAR = "its reach (radius) is too small to go that far"
+SMALL = "it reaches over only {:.2g} cells of the simulation; give it a larger reach (radius)"
 FIT = "Fit"  # what the history calls an edit by a fit
-ANEW = "; Fit leads all anew, which may bring it nearer"
+ANEW = "fluidwarp fit leads all handles anew, which may bring them nearer"
 HELPED = ("strain", "frozen", "at odds", "soft", "alone")  # where it may
 
 
@@ -114,9 +118,25 @@ def as_seen(held: list[Held], replay: Replay) -> list[Held]:
     return seen
 
 
-def unmet(replay: Replay, within: float, is_fitted: bool = False) -> Iterator[tuple[str, str]]:
-    """Which handles are farther than `within` longer sides from where they are led, by what messages call them, and a
-    sentence of how far each is; whether they have just been fitted, which is not said to help again.
+class Unmet(NamedTuple):
+    """A handle or a pin that is not where it is led.
+
+    Attributes:
+        label: what messages call it.
+        said: a sentence of how far it is, and why.
+        helped: a fit may bring it nearer.
+    """
+
+    label: str
+    said: str
+    helped: bool
+
+
+def unmet(replay: Replay, within: float, is_fitted: bool = False) -> Iterator[Unmet]:
+    """Which are farther than `within` longer sides from where they are led.
+
+    Of what has let go, only what did so before its way was over. `is_fitted`: they have just been fitted, which is not
+    said to help again.
     """
     if not replay.handles.handles:
         return
@@ -124,16 +144,24 @@ def unmet(replay: Replay, within: float, is_fitted: bool = False) -> Iterator[tu
     for (label, led), far, points, halt in zip(
         replay.led, replay.handles.away, replay.handles.shapes, replay.handles.halts, strict=True
     ):
-        if not far <= within:
+        if not (far <= within or (halt == "over" and led.span[1] <= led.let_go)):
             held = points if led.points else points[:1]
             columns, rows = np.clip(held / replay.grid.spacing, 0, np.array(replay.grid.size) - 1).astype(int).T
             if halt == "strain" and _nearest_of(solid, replay, held) < led.radius:
                 halt = "frozen"
+            why, cells = HALTED[halt], led.radius * max(replay.grid.size)
             # A fit leads what goes somewhere, and leaves pins as they are.
-            helps = halt in HELPED and isinstance(led, RecipeHandle) and led.is_led and not is_fitted
-            why = FROZEN if solid[rows, columns].any() else f"{HALTED[halt]}{ANEW if helps else ''}"
+            helped = halt in HELPED and isinstance(led, RecipeHandle) and led.is_led and not is_fitted
+            is_wide = cells >= LEAST_PER_RADIUS or (isinstance(led, RecipeHandle) and led.local == 1)
+            if solid[rows, columns].any():
+                why, helped = FROZEN, False
+            elif halt in HELPED and leads_too_far(led, replay.grid.extent):  # `objections` say what helps
+                why, helped = why if halt == "frozen" else FAR, False
+            elif helped and halt in ("strain", "alone") and not is_wide:
+                why, helped = SMALL.format(cells), False
             pixels = far * max(replay.pictures.source.width, replay.pictures.source.height)
-            yield label, f"{label} is {pixels:.3g} pixels ({far:.3g} longer sides) away from where it is led: {why}"
+            said = f"{label} is {pixels:.3g} pixels ({far:.3g} longer sides) away from where it is led: {why}"
+            yield Unmet(label, said, helped)
 
 
 def _nearest_of(solid: np.ndarray, replay: Replay, places: np.ndarray) -> float:

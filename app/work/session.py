@@ -15,7 +15,7 @@ import numpy as np
 
 from app.media.project import Project
 from app.model.handles import ARRIVED, MOST_OBJECTIONS, objections
-from app.work.handle_status import FIT, Held, as_seen, held_in, unmet
+from app.work.handle_status import FIT, Held, Unmet, as_seen, held_in, unmet
 from app.work.playing import Playing
 from app.work.recording import BUDGET
 from app.work.replay import Replay
@@ -65,15 +65,19 @@ class Session(Playing):
         return self._once("objections", led, lambda: tuple(islice(objections(*led, self.extent), MOST_OBJECTIONS)))
 
     @property
-    def unmet(self) -> dict[str, str]:
-        """Which handles have come to rest, at the end, elsewhere than where they are led, and how the command line says
-        it, by what messages call them; reads back from the GPU.
+    def unmet(self) -> dict[str, Unmet]:
+        """Which handles have come to rest, at the end, elsewhere than where they are led, by what messages call them;
+        reads back from the GPU.
         """
         replay = self.replay
         if self.is_moving or self.tick != self.end or not replay.recipe.leads:
             return {}
         is_fitted = self.document.history.undo_name == FIT
-        return self._once("unmet", (self._state, is_fitted), lambda: dict(unmet(replay, ARRIVED, is_fitted)))
+
+        def find() -> dict[str, Unmet]:
+            return {each.label: each for each in unmet(replay, ARRIVED, is_fitted)}
+
+        return self._once("unmet", (self._state, is_fitted), find)
 
     @property
     def folds(self) -> tuple[int, int]:

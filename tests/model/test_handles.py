@@ -155,7 +155,7 @@ def test_a_line_that_stays_short_beside_an_edge_is_told_of() -> None:
     line = {"points": [[0.02, 0.3], [0.3, 0.5]], "at": [0.02, 0.3]}
     assert [*objections([handle(**line, to=[0.07, 0.3])], [], (1.0, 1.0))] == []
     (said,) = objections([handle(**line, to=[0.12, 0.3])], [], (1.0, 1.0))
-    assert said == "handle[1] stays 0.04 longer sides short: what is at the picture's edge stays there"
+    assert said == "handle[1] stays 4% of the longer side short: what is at the picture's edge stays there"
 
 
 def test_what_is_only_turned_is_on_its_way_too() -> None:
@@ -179,3 +179,8 @@ def test_sixty_four_handles_and_pins_work() -> None:
 def test_the_window_calls_the_radius_as_its_slider_is_called() -> None:
     (said,) = objections([handle(to=[0.75, 0.5])], [], (1.0, 1.0))
     assert heading(said) == "Handle 1 goes only 2 times as far as it reaches, of 2.5 to its goal; give it a larger Size"
+
+
+def test_the_window_tells_how_far_in_pixels_alone() -> None:
+    said = 'handle[2] "chin" is 2.95 pixels (5.9e-03 longer sides) away from where it is led: it has not begun'
+    assert heading(said) == 'Handle 2 "chin" is 2.95 pixels away from where it is led: it has not begun'

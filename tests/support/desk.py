@@ -108,6 +108,14 @@ class Desk:
 
         return display.Display(self.env["DISPLAY"])
 
+    def scale(self, factor: float) -> None:
+        """Tell programs that start from now on how much larger than usual they should draw."""
+        from Xlib import Xatom
+
+        resources = f"Xft.dpi:\t{96 * factor:g}\n".encode()
+        self._x.screen().root.change_property(Xatom.RESOURCE_MANAGER, Xatom.STRING, 8, resources)
+        self._x.sync()
+
     def dump(self) -> bytes:
         """The file in which the server keeps the screen, as it is now."""
         return (self.folder / "Xvfb_screen0").read_bytes()

@@ -21,6 +21,7 @@ from app.ui.panels.lanes import name_of
 from app.ui.viewport import Rect
 from app.work.session import Session
 from solver.gl.device import Device
+from support.drawn import Drawn
 from support.editing import Robot, small_project
 from support.widgets import Widgets
 
@@ -358,6 +359,33 @@ def test_handles_and_pins_are_bars_too(robot: Robot) -> None:
     for _ in range(5):
         robot.key("ctrl+z")
     assert recipe(robot) == begun
+
+
+@pytest.mark.parametrize(
+    ("points", "words", "is_inside"),
+    [(200, "Handle 1", True), (60, "1", True), (24, "1", True), (10, "1", False)],
+    ids=["wide", "narrow", "small", "least"],
+)
+def test_a_handle_is_known_by_its_number_where_its_bar_has_no_room_for_its_name(
+    robot: Robot, monkeypatch: pytest.MonkeyPatch, points: float, words: str, is_inside: bool
+) -> None:
+    handle, session = RecipeHandle(at=(0.4, 0.5), to=(0.42, 0.5), duration=1.0), robot.editor.session
+    session.edit("Handle", handle=(handle,), duration=10.0)
+    robot.rest()
+    robot.key("l")
+    robot.frame(count=2)
+    length = points / place(robot, 0, "handle").width
+    session.edit("Handle", handle=(handle.edited(duration=length),))
+    robot.rest()
+    with monkeypatch.context() as noting:
+        drawn = Drawn(noting)
+        robot.frame()
+    rect, lines = place(robot, 0, "handle"), drawn.take()
+    assert rect.width == pytest.approx(points, abs=3)
+    texts = [(line.split()[1:3], line.partition(" | ")[2]) for line in lines if line.startswith("add_text ")]
+    lane = [(float(x), said) for (x, y), said in texts if rect.y < float(y) < rect.bottom]
+    ((x, said),) = [each for each in lane if rect.x < each[0] < rect.right + 10]
+    assert (said, x < rect.right) == (words, is_inside)  # or on what it holds after it
 
 
 def many(count: int) -> tuple[Stroke, ...]:

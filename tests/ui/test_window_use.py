@@ -184,6 +184,18 @@ def test_with_little_room_everything_is_reached(tmp_path: Path) -> None:
         desk.close()
 
 
+@pytest.mark.parametrize("size", [(1600, 1040), (3000, 1700)], ids=["small", "large"])
+def test_at_200_percent_the_window_is_twice_as_large_but_fits(tmp_path: Path, size: tuple[int, int]) -> None:
+    desk = Desk(tmp_path, size)
+    try:
+        desk.scale(2.0)
+        desk.open_pattern()
+        told = dict(line.split("=") for line in desk.do("getwindowgeometry", "--shell", desk.window).split())
+        assert (int(told["WIDTH"]), int(told["HEIGHT"])) == (min(size[0], 2560), min(size[1], 1600))
+    finally:
+        desk.close()
+
+
 def test_a_file_that_is_not_there_and_a_command_that_is_none_are_told_in_a_sentence(
     tmp_path: Path, fluidwarp: Run
 ) -> None:

@@ -266,21 +266,21 @@ def test_why_a_line_stays_short_beside_the_edge_is_told(device: Device):
     line = {"points": [[0.05, 0.3], [0.05, 0.7]], "to": [0.22, 0.5], "duration": 0.1}
     replay = replay_of(device, handle=[line], fluid={"grid": 16}, duration=0.1)
     replay.seek(4)
-    ((_, said),) = unmet(replay, ARRIVED)
+    ((_, said, _),) = unmet(replay, ARRIVED)
     assert said.endswith("away from where it is led: what is at the picture's edge stays there")
     replay.release()
 
 
 def test_that_the_map_bears_no_more_is_told_and_what_may_mend_it(device: Device):
-    replay = replay_of(device, handle=[led_to([0.4, 0.5], [0.6, 0.5])], fluid={"grid": 32}, duration=0.1)
+    replay = replay_of(device, handle=[led_to([0.4, 0.5], [0.6, 0.5])], fluid={"grid": 48}, duration=0.1)
     folded = np.zeros((96, 128, 2), np.float32)
     folded[:, 66, 0] = 1.5 / 128
     replay.warp.set(folded)
     replay.advance()
-    ((_, said),) = unmet(replay, ARRIVED)
-    assert said.endswith("bent as far as it bears; Fit leads all anew, which may bring it nearer")
-    ((_, said),) = unmet(replay, ARRIVED, is_fitted=True)
-    assert said.endswith("bent as far as it bears")
+    for is_fitted in (False, True):
+        ((_, said, helped),) = unmet(replay, ARRIVED, is_fitted)
+        assert said.endswith("bent as far as it bears")
+        assert helped != is_fitted
     replay.release()
 
 
@@ -294,7 +294,7 @@ def test_a_map_that_only_slows_a_handle_down_does_not_keep_it_from_its_goal(devi
     swollen[..., 0] = (det - 1) * ((np.arange(128) + 0.5) / 128 - 0.5)
     replay.warp.set(swollen)
     replay.advance()
-    ((_, told),) = unmet(replay, ARRIVED, is_fitted=True)
+    ((_, told, _),) = unmet(replay, ARRIVED, is_fitted=True)
     assert told.endswith(said)
     replay.release()
 
@@ -377,16 +377,16 @@ def test_what_is_made_up_is_less_beside_what_is_thick_and_in_all_places_alike(co
 
 
 def test_what_is_frozen_beside_a_handle_is_told(device: Device):
-    """Farther off than it reaches it is not."""
+    """Farther off than it reaches it is not; and what is led too far would not get there with a larger reach either."""
     frozen_disc = {"kind": "path", "points": [[0.65, 0.5]], "radius": 0.05, "hardness": 1.0}
     folded = np.zeros((96, 128, 2), np.float32)
     folded[:, 64, 0] = 1.5 / 128
-    for at, between in (0.5, True), (0.35, False):
-        led = led_to([at, 0.5], [at, 0.4], radius=0.2)
-        replay = replay_of(device, handle=[led], freeze=[frozen_disc], fluid={"grid": 32}, duration=0.1)
+    for at, to, between in (0.5, (0.5, 0.4), True), (0.5, (0.95, 0.5), True), (0.35, (0.35, 0.4), False):
+        led = led_to([at, 0.5], [*to], radius=0.2)
+        replay = replay_of(device, handle=[led], freeze=[frozen_disc], fluid={"grid": 64}, duration=0.1)
         replay.warp.set(folded)
         replay.advance()
-        ((_, said),) = unmet(replay, ARRIVED)
+        ((_, said, _),) = unmet(replay, ARRIVED)
         assert ("the picture between it and what is frozen is bent" in said) == between
         assert "bent as far as it bears" in said
         replay.release()
@@ -396,10 +396,9 @@ def test_what_lets_go_by_itself_is_not_said_to_be_in_another_s_way(device: Devic
     soft = led_to([0.4, 0.5], [0.6, 0.5], stiffness=0.01, duration=0.1)
     replay = replay_of(device, handle=[soft], fluid={"grid": 16, "viscosity": 1.0, "drag": 20.0}, duration=0.8)
     replay.seek(48)
-    ((_, said),) = unmet(replay, ARRIVED)
-    assert said.endswith(
-        "it gives way to the fluid, and wants more stiffness; Fit leads all anew, which may bring it nearer"
-    )
+    ((_, said, helped),) = unmet(replay, ARRIVED)
+    assert said.endswith("it gives way to the fluid, and wants more stiffness")
+    assert helped
 
 
 def test_only_what_a_fit_leads_is_told_of_it(device: Device):
@@ -407,25 +406,61 @@ def test_only_what_a_fit_leads_is_told_of_it(device: Device):
     led = led_to([0.4, 0.5], [0.6, 0.5])
     replay = replay_of(
         device, handle=[led, led | {"end": 0.0}, led | {"start": 5.0}], pin=[{"at": [0.5, 0.5]}],
-        fluid={"grid": 32}, duration=0.1,
+        fluid={"grid": 48}, duration=0.1,
     )  # fmt: skip
     replay.advance()
     folded = np.zeros((96, 128, 2), np.float32)
     folded[:, 66, 0] = 1.5 / 128
     replay.warp.set(folded)
-    said = {label: sentence.partition("is led")[2] for label, sentence in unmet(replay, -1.0)}
-    bent = ": the picture around it is bent as far as it bears"
-    fit = "; Fit leads all anew, which may bring it nearer"
-    over, waiting = ": it has let go by now", ": it has not begun"
-    assert said == {"handle[1]": bent + fit, "handle[2]": over, "handle[3]": waiting, "pin[1]": bent}
+    said = {label: (sentence.partition("is led: ")[2], helped) for label, sentence, helped in unmet(replay, -1.0)}
+    bent = "the picture around it is bent as far as it bears"
+    over, waiting = "it has let go by now", "it has not begun"
+    assert said == {
+        "handle[1]": (bent, True),
+        "handle[2]": (over, False),
+        "handle[3]": (waiting, False),
+        "pin[1]": (bent, False),
+    }
+    replay.release()
+
+
+def test_what_has_let_go_is_asked_for_nothing_unless_its_way_was_not_over(device: Device):
+    led = led_to([0.4, 0.5], [0.5, 0.5], duration=0.1)
+    ended = [led | {"end": 0.1}, led_to([0.4, 0.2], [0.5, 0.2]) | {"end": 0.1}]
+    replay = replay_of(device, handle=ended, pin=[{"at": [0.9, 0.5], "end": 0.1}], fluid={"grid": 32}, duration=0.3)
+    replay.seek(18)
+    assert [each.label for each in unmet(replay, -1.0)] == ["handle[2]"]
+    replay.release()
+
+
+@pytest.mark.parametrize(
+    ("radius", "far", "local", "why", "helped"),
+    [
+        (0.1, 3.0, 0.0, "its reach (radius) is too small to go that far", False),
+        (0.03, 0.8, 0.0, "it reaches over only 1.9 cells of the simulation; give it a larger reach (radius)", False),
+        (0.03, 1.5, 1.0, "the picture around it is bent as far as it bears", True),
+        (0.2, 1.9, 0.0, "the picture around it is bent as far as it bears", True),
+    ],
+    ids=["too far", "small", "small and local", "neither"],
+)
+def test_of_what_is_missed_one_remedy_is_told(
+    device: Device, radius: float, far: float, local: float, why: str, helped: bool
+):
+    """`objections` tell of what goes too far that it wants a larger radius; no fit is offered beside that."""
+    one = led_to([0.3, 0.5], [0.3 + far * radius, 0.5], radius=radius, local=local)
+    replay = replay_of(device, handle=[one], duration=3.0)
+    replay.seek(180)
+    ((_, said, is_helped),) = unmet(replay, ARRIVED)
+    assert (said.partition("is led: ")[2], is_helped) == (why, helped)
+    assert bool([*objections(replay.recipe.handle, (), EXTENT)]) == why.startswith("its reach")
     replay.release()
 
 
 def test_handles_of_which_none_has_begun_say_so(device: Device):
-    late = led_to([0.4, 0.5], [0.6, 0.5], start=5.0)
+    late = led_to([0.4, 0.5], [0.6, 0.5], radius=0.05, start=5.0)  # and far, which is told beside
     replay = replay_of(device, handle=[late], fluid={"grid": 16}, duration=0.1)
     replay.advance()
-    ((_, said),) = unmet(replay, ARRIVED)
+    ((_, said, _),) = unmet(replay, ARRIVED)
     assert said.endswith("away from where it is led: it has not begun")
     replay.release()
 
@@ -758,7 +793,7 @@ def test_what_is_not_reached_is_told_by_number(device: Device):
     handles = [led_to([0.6, 0.6], [0.7, 0.6]), led_to([0.15, 0.17], [0.4, 0.5], name="held")]
     replay = replay_of(device, handle=handles, freeze=[frozen_disc])
     replay.seek(48)
-    ((label, said),) = unmet(replay, ARRIVED)
+    ((label, said, _),) = unmet(replay, ARRIVED)
     assert label == 'handle[2] "held"'
     assert said.startswith('handle[2] "held" is ')
     assert said.endswith("away from where it is led: what it holds is frozen")
@@ -772,7 +807,7 @@ def test_a_line_that_is_led_about_a_place_far_outside_is_told_of(device: Device)
     line = {"at": [0.5, -4.0], "points": [[0.2, 0.5], [0.6, 0.5]], "to": [0.5, -3.8], "duration": 0.1}
     replay = replay_of(device, handle=[line], freeze=[frozen_disc], duration=0.1)
     replay.seek(4)
-    ((_, said),) = unmet(replay, ARRIVED)
+    ((_, said, _),) = unmet(replay, ARRIVED)
     assert said.endswith("away from where it is led: what it holds is frozen")
     replay.release()
 
@@ -793,7 +828,7 @@ def test_what_is_left_of_a_turned_line_is_its_farthest_point_s_way_wherever_it_i
     assert turned.left == pytest.approx(farthest)
     assert held.left == pytest.approx(0.6, abs=0.02)
     assert held.target == pytest.approx((0.2, 0.2))
-    for one, (label, said) in zip((turned, held), unmet(replay, ARRIVED), strict=True):
+    for one, (label, said, _) in zip((turned, held), unmet(replay, ARRIVED), strict=True):
         assert one.label == label
         assert f"is {one.left * 128:.3g} pixels" in said
     replay.release()
@@ -853,7 +888,7 @@ def test_what_walls_part_from_its_goal_is_told_and_folds_nothing(device: Device)
     wall = {"kind": "path", "points": ring.tolist(), "radius": 0.04, "hardness": 1.0}
     replay = replay_of(device, handle=[led_to([0.4, 0.5], [0.6, 0.5], radius=0.1)], freeze=[wall], duration=1.0)
     replay.seek(60)
-    ((label, _),) = unmet(replay, ARRIVED)
+    ((label, _, _),) = unmet(replay, ARRIVED)
     assert label == "handle[1]"
     found = replay.warp.statistics()
     assert found.folds == 0
@@ -892,7 +927,7 @@ def test_what_cannot_be_met_is_objected_to():
         "handle[1] takes hold of nothing: (1.2, 0.5) is outside the picture",
         "handle[2] goes only to the picture's edge: (0.2, -0.5) is outside the picture",
         "handle[9] reaches out of the picture: what is outside is not led",
-        "handle[9] stays 0.1 longer sides short: what is at the picture's edge stays there",
+        "handle[9] stays 10% of the longer side short: what is at the picture's edge stays there",
         "handle[10] is led inside out",
         "handle[2] and handle[9] are led 5.1 times as far apart as they lie",
         "handle[3] and handle[4] cross each other's way",

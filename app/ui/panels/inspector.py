@@ -202,16 +202,16 @@ def _handles(ui: Ui, workspace: Workspace, state: EditorState, do: Do) -> None:
     rest = f", {len(unmet)} did not arrive" if unmet else f", {away} not there yet" if away else ""
     if recipe.leads:
         ui.dim(f"{len(recipe.handle) + len(recipe.pin)} in all{rest}")
-    for said in (*session.objections, *unmet.values()):
-        ui.wrapped(f"{heading(said)}.", ui.palette.text, 13)
-    with ui.enabled(any(handle.is_led and not handle.muted for handle in recipe.handle)):
+    with ui.enabled(recipe.can_fit):
         if ui.button("Fit##handles", width=-1, height=30):
             do("fit_handles")
-        more = "Finds the reach and the speed of each; may take a minute."
+        more = "Finds the reach and the speed of each, which may bring them nearer. May take a minute."
         ui.tooltip("Move all of them together, with the least work", ACTIONS["fit_handles"].key, more, above=True)
     if ui.button("Fit a mask to another ...", width=-1, height=30):
         do("fit_masks")
     ui.tooltip("Leads the outline of the white area of one picture to that of another", more="Makes handles along it.")
+    for said in (*session.objections, *(each.said for each in unmet.values())):
+        ui.wrapped(f"{heading(said)}.", ui.palette.text, 13)
 
 
 def _turn(ui: Ui, session: Session, label: str, led: RecipeHandle) -> None:

@@ -147,7 +147,8 @@ def name_of(one: Actor, which: Which) -> str:
     if isinstance(one, Stroke):
         return one.tool.capitalize()
     if isinstance(one, RecipeHandle | RecipePin):
-        return heading(label_of(one.kind, which[1] + 1, one.name))
+        is_pin = isinstance(one, RecipeHandle) and not one.is_led
+        return f"{heading(label_of(one.kind, which[1] + 1, one.name))}{' (pin)' * is_pin}"
     return one.name or f"{one.kind.capitalize()} force"
 
 
@@ -243,19 +244,26 @@ def _bar(ui: Ui, session: Session, state: EditorState, bar: Bar, y: float, scale
     draw.add_rect_filled(low, high, packed(colour, faint), ui.px(4))
     if bar.which in lanes.selected:
         draw.add_rect(low, high, packed(palette.text), ui.px(4), ui.px(2))
-    if right - left < ui.px(26):
-        return
     ink = packed(palette.text if bar.muted else INK, 0.6 if bar.muted else 0.9)
     icon = "mute" if bar.muted else ICONS.get(kind, kind)
     icon = icon if icon in icons.PATHS else "force"
+    is_numbered, room = isinstance(one, RecipeHandle | RecipePin), right - left - ui.px(10)
+    imgui.push_font(ui.fonts.regular, 12.5)
+    words = name_of(one, bar.which)
+    if is_numbered and ui.px(18) + imgui.calc_text_size(words).x > room:
+        words = str(bar.which[1] + 1)  # as at its mark on the picture, which tells more than the icon
+    width = imgui.calc_text_size(words).x
     x = max(left, scale.x0) + ui.px(6)
     draw.push_clip_rect(low, ImVec2(high.x - ui.px(4), high.y), True)
-    icons.draw(draw, icon, x, y + ui.px(3.5), ui.px(13), ink, 2.0)
-    if right - left > ui.px(60):
-        imgui.push_font(ui.fonts.regular, 12.5)
-        draw.add_text(ImVec2(x + ui.px(18), y + ui.px(3)), ink, name_of(one, bar.which))
-        imgui.pop_font()
+    if room > (ui.px(18) + width if is_numbered else ui.px(16)):
+        icons.draw(draw, icon, x, y + ui.px(3.5), ui.px(13), ink, 2.0)
+        x += ui.px(18)
+    if room > (width if is_numbered else ui.px(50)):
+        draw.add_text(ImVec2(x, y + ui.px(3)), ink, words)
     draw.pop_clip_rect()
+    if is_numbered and room <= width < min(scale.across(bar.stops), scale.x1) - right - ui.px(8):
+        draw.add_text(ImVec2(right + ui.px(4), y + ui.px(3)), packed(palette.text, 0.9), words)
+    imgui.pop_font()
 
 
 def _after(ui: Ui, bar: Bar, y: float, colour: int, scale: Scale) -> None:
