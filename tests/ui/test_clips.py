@@ -23,7 +23,7 @@ from app.media.pictures import read_picture, write_picture
 from app.media.reel import AHEAD, Reel
 from app.model.picture import Picture
 from app.progress import Progress
-from app.ui.export_dialog import ANIMATION, ANIMATIONS, PICTURE
+from app.ui.export_choices import ANIMATION, ANIMATIONS, PICTURE
 from app.ui.files import tick_for
 from app.work.export import run
 from app.work.jobs import Outputs
@@ -124,12 +124,12 @@ def test_what_is_exported_is_what_the_command_line_makes(viewer: Robot, device: 
     go_to(viewer, 6)
     dialog = export_dialog(viewer, tmp_path)
     assert [preset.name for preset in dialog.presets] == ["Web", "Print", "Film"], "no ping-pong of a clip"
-    dialog.kind, dialog.name = ANIMATION, "dialog"
-    dialog.format[ANIMATION] = next(n for n, kind in enumerate(ANIMATIONS) if kind.name == "MP4")
+    dialog.choices.kind, dialog.name = ANIMATION, "dialog"
+    dialog.choices.format[ANIMATION] = next(n for n, kind in enumerate(ANIMATIONS) if kind.name == "MP4")
     run(device, dialog.job(), Progress())
     dialog.start, dialog.end, dialog.name = 0.2, 0.24, "part"
     run(device, dialog.job(), Progress())
-    dialog.kind, dialog.name = PICTURE, "still"
+    dialog.choices.kind, dialog.name = PICTURE, "still"
     run(device, dialog.job(), Progress())
     editor.files.write(tmp_path / "work.fluidwarp")
     (tmp_path / "work.toml").write_text(session.recipe.text(), "utf-8")

@@ -23,7 +23,8 @@ from app.ui.chooser import FileChooser
 from app.ui.clock import FRAMES, HOVERING, PACE
 from app.ui.editor import Editor
 from app.ui.events import LEFT, Button, Event, Key, Mods, Move, Text, Wheel
-from app.ui.export_dialog import ANIMATION, ExportDialog
+from app.ui.export_choices import ANIMATION
+from app.ui.export_dialog import ExportDialog
 from app.ui.files import load_any
 from app.ui.layout import Layout
 from app.ui.panels.hud import BEHIND
@@ -336,9 +337,9 @@ def test_the_size_of_an_export_is_typed_as_it_is_shown(
     robot.frame(count=3)
     dialog = robot.editor.dialogs.shown[-1]
     assert isinstance(dialog, ExportDialog)
-    assert dialog.size == 240
+    assert dialog.choices.size == 240
     type_into(robot, dialog.rect.x + 250, dialog.rect.y + 238, f"{typed} pixels")
-    assert dialog.size == 120
+    assert dialog.choices.size == 120
     robot.close()
 
 
@@ -374,7 +375,7 @@ def test_enter_ends_the_typing_in_an_export_field_and_starts_nothing(robot: Robo
     dialog = robot.editor.dialogs.shown[-1]
     assert isinstance(dialog, ExportDialog)
     type_into(robot, dialog.rect.x + 250, dialog.rect.y + 238, "100")
-    assert dialog.size == 100
+    assert dialog.choices.size == 100
     assert not robot.editor.exports.is_running
     robot.click(dialog.rect.x + 100, dialog.rect.y + 397)
     robot.key("end")
@@ -550,7 +551,7 @@ def test_the_head_of_a_dialog_stays_where_it_is(device: Device, tmp_path: Path, 
     for kind in (1, 2, 0, 1):
         robot.click(dialog.rect.x + 100 + 150 * kind, top + 109)
         robot.frame(count=5)
-        assert dialog.kind == kind
+        assert dialog.choices.kind == kind
         assert dialog.rect.y == top
         assert dialog.rect.bottom <= size[1]
         heights.add(dialog.rect.height)
@@ -802,7 +803,7 @@ def test_the_end_of_every_dialog_is_reached_in_a_small_window(small: Robot) -> N
     small.frame(count=4)
     dialog = small.editor.dialogs.shown[-1]
     assert isinstance(dialog, ExportDialog)
-    dialog.kind = ANIMATION
+    dialog.choices.kind = ANIMATION
     small.frame(count=4)
     assert dialog.rect.bottom <= small.size[1]
     assert dialog.rect.y >= 0
