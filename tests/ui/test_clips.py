@@ -282,6 +282,18 @@ class Slow(Counted):
             yield each
 
 
+def test_a_frame_is_awaited_until_it_is_the_one_that_is_shown() -> None:
+    """Also once it has been read: nothing else would make the window draw again."""
+    clip = Counted(path=Path("a"), width=2, height=2, bits=8, alpha=False, pixel_format="rgb24", fps=RATE, frames=5)
+    reel = Reel(clip, lambda picture: picture.pixels)
+    reel.want(3, runs=False)
+    deadline = time.monotonic() + 60
+    while ((best := reel.best()) is None or best[0] != 3) and time.monotonic() < deadline:
+        time.sleep(0.001)
+    assert (reel.awaits(2), reel.awaits(3)) == (True, False)
+    reel.close()
+
+
 @pytest.mark.parametrize("runs", [True, False])
 def test_the_newest_frame_before_it_stands_in_for_one_that_is_late(runs: bool) -> None:
     """While it runs; one that is looked for is not shown as another that lies farther on."""

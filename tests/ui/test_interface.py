@@ -257,6 +257,26 @@ def test_clicks_and_keys_that_come_all_at_once_are_heard_one_after_the_other(rob
     assert robot.editor.state.tool_name == "twirl"
 
 
+@pytest.mark.parametrize("action", [None, "export"])
+def test_keys_that_come_with_the_one_that_leaves_a_field_wait_for_that(robot: Robot, action: str | None) -> None:
+    """Into a field that is typed in: a number, Enter or the key of an action that has no Ctrl, and keys after it."""
+    rect = robot.editor.layout.inspector
+    assert rect is not None
+    ctrl_click(robot, rect.x + 120, rect.y + 111)
+    robot.frame(count=5)
+    left = ["enter"]
+    if action:
+        robot.editor.keys.set(action, "f9")
+        left = ["f9", "escape"]
+    typed = [event for letter in "0.7" for event in (Key(letter, True), Text(letter), Key(letter, False))]
+    keys = [Key(key, down) for key in left for down in (True, False)]
+    robot.frame(*typed, *keys, Key("t", True), Text("t"), Key("t", False), dt=0.5)
+    robot.frame(count=30)
+    assert robot.editor.session.recipe.fluid.viscosity == pytest.approx(0.7)
+    assert robot.editor.state.tool_name == "twirl"
+    assert not robot.editor.dialogs.shown
+
+
 @pytest.mark.parametrize("together", [True, False], ids=["click", "release"])
 def test_a_stroke_that_comes_together_with_the_click_on_its_tool_is_drawn_with_it(robot: Robot, together: bool) -> None:
     """Also if only the release of that click comes with the stroke, as a button acts when it is let go of."""
