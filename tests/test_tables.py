@@ -15,7 +15,7 @@ from typing import Any
 import solver
 from app.media import clip, encoders, formats
 from app.model import presets, tools
-from app.ui import actions, editor_state, export_dialog, key_sheet
+from app.ui import actions, editor_state, export_choices, key_sheet
 from app.ui.preferences import Preferences
 from app.work.jobs import MapOutput, Outputs
 from support.golden import GOLDEN, WRITES
@@ -57,11 +57,11 @@ def rows() -> Iterator[str]:
     yield f"colours: {told(clip.CODES)}"
     for kind in formats.TABLE:
         yield f"{kind.name}: {told(kind)}"
-    for one in (*presets.FEELS, *presets.BRUSHES, *tools.TOOLS, *actions.ACTIONS.values(), *export_dialog.PRESETS):
+    for one in (*presets.FEELS, *presets.BRUSHES, *tools.TOOLS, *actions.ACTIONS.values(), *export_choices.PRESETS):
         yield f"{type(one).__name__} {told(one)}"
-    for label, files in export_dialog.KINDS:
+    for label, files in export_choices.KINDS:
         yield from (f"{label}: {told(file)}" for file in files)
-    yield f"rated: {export_dialog.RATED}"
+    yield f"rated: {export_choices.RATED}"
     yield f"brush: {told(tools.BrushSettings())} {told(editor_state.LIMITS)}"
     yield f"window: {told(Preferences())} {told(editor_state.overlays())}"
     yield from (f"mouse: {line}" for line in key_sheet.MOUSE)

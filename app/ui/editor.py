@@ -23,7 +23,7 @@ from app.ui.clock import PACE, Clock
 from app.ui.commands import Commands
 from app.ui.dialogs import Dialogs
 from app.ui.editor_state import EditorState
-from app.ui.events import Button, CloseWish, Drop, Event, Focus, Key, Mods, Move, Text, Wheel
+from app.ui.events import Button, CloseWish, Drop, Event, Focus, Key, Move, Text, Wheel
 from app.ui.export_dialog import Exports
 from app.ui.files import Files
 from app.ui.fitting import Fits
@@ -243,7 +243,7 @@ class Editor:
             match event:
                 case Move(x, y):
                     at = x, y
-                case Text() | Key(down=True) if self._known < TOLD or self._once_typed or self._clicked:
+                case Text() | Key(down=True) if self._known < TOLD or self._clicked:
                     heard, self._later = heard[:number], heard[number:]
                     break
                 case Button(down=True) if self._clicked and self.pointer.reaches_canvas(*at):
@@ -255,8 +255,8 @@ class Editor:
                 # imgui hears no repeats; those of a key that is held would pile up behind one another.
                 case Key("enter" | "escape" | "tab", True, repeat=False):
                     self._known = 0
-                case Key(down=True, mods=Mods(ctrl=True)) if self.backend.is_typing:
-                    self._known = 0  # an action may leave the field
+                case Key(key, True, mods) if self.backend.is_typing and self._leaves_a_field(mods.chord(key)):
+                    self._known = 0
         if not self.backend.is_behind:  # else it has not yet taken up the click
             self._known += 1
         return heard
@@ -332,8 +332,13 @@ class Editor:
             return
         if not self.backend.is_typing:
             self.do(action.name)
-        elif action.group == "File":
+        elif self._leaves_a_field(chord):
             self._once_typed.append(action.name)
+
+    def _leaves_a_field(self, chord: str) -> bool:
+        """Whether its action is about files, and done while something is typed too, which is taken first."""
+        name = self.keys.action(chord)
+        return name is not None and ACTIONS[name].group == "File"
 
     def _draw(self, target: moderngl.Framebuffer, size: tuple[int, int], dt: float, events: Sequence[Event]) -> None:
         target.viewport = (0, 0, *size)
@@ -346,8 +351,10 @@ class Editor:
         with self.clock.measure("canvas"):
             self.canvas.draw(target, size[1], self.view, self.session, self.state, self.ui.palette, self.ui.scale)
         by_keys = bool(self.dialogs.shown) or self.ui.has_popup
+        # What is typed in this frame the field takes only as it is drawn.
+        is_typed = self.backend.is_behind or any(isinstance(event, Key | Text) for event in events)
+        has_typed = bool(self._once_typed) and not is_typed
         self.backend.begin((size[0] / self.ui.density, size[1] / self.ui.density), self.ui.density, dt, events, by_keys)
-        has_typed = bool(self._once_typed) and not self.backend.is_behind
         if has_typed:
             # The field is left, as if by Enter, so that what was typed is taken before it is saved.
             internal.clear_active_id()

@@ -227,8 +227,9 @@ def check_again_and_again(device: Device, seed: int) -> dict[str, float]:
     field.read.set(velocity)
     projection.project(field, cycles, source, warm=True)
     first = field.read.get().astype(np.float64)
-    for _ in range(60):
-        projection.project(field, cycles, source, warm=True)
+    iterations = [projection.project(field, cycles, source, warm=True) for _ in range(60)]
+    # What rounding leaves is not solved for: that would end nowhere.
+    assert source or cycles or not any(iterations[10:]), f"{kind.__name__} {size}: {iterations}"
     moved = np.linalg.norm(field.read.get() - first) / np.linalg.norm(velocity)
     assert moved <= 1e-2, f"{kind.__name__} {size}: {moved:.2e}"
     for item in (projection, field, *([source] if source else [])):

@@ -23,7 +23,7 @@ from app.media.pictures import read_picture, write_picture
 from app.media.reel import AHEAD, Reel
 from app.model.picture import Picture
 from app.progress import Progress
-from app.ui.export_dialog import ANIMATION, ANIMATIONS, PICTURE
+from app.ui.export_choices import ANIMATION, ANIMATIONS, PICTURE
 from app.ui.files import tick_for
 from app.work.export import run
 from app.work.jobs import Outputs
@@ -124,12 +124,12 @@ def test_what_is_exported_is_what_the_command_line_makes(viewer: Robot, device: 
     go_to(viewer, 6)
     dialog = export_dialog(viewer, tmp_path)
     assert [preset.name for preset in dialog.presets] == ["Web", "Print", "Film"], "no ping-pong of a clip"
-    dialog.kind, dialog.name = ANIMATION, "dialog"
-    dialog.format[ANIMATION] = next(n for n, kind in enumerate(ANIMATIONS) if kind.name == "MP4")
+    dialog.choices.kind, dialog.name = ANIMATION, "dialog"
+    dialog.choices.format[ANIMATION] = next(n for n, kind in enumerate(ANIMATIONS) if kind.name == "MP4")
     run(device, dialog.job(), Progress())
     dialog.start, dialog.end, dialog.name = 0.2, 0.24, "part"
     run(device, dialog.job(), Progress())
-    dialog.kind, dialog.name = PICTURE, "still"
+    dialog.choices.kind, dialog.name = PICTURE, "still"
     run(device, dialog.job(), Progress())
     editor.files.write(tmp_path / "work.fluidwarp")
     (tmp_path / "work.toml").write_text(session.recipe.text(), "utf-8")
@@ -280,6 +280,18 @@ class Slow(Counted):
         for each in super().pictures(part):
             self.let.acquire()
             yield each
+
+
+def test_a_frame_is_awaited_until_it_is_the_one_that_is_shown() -> None:
+    """Also once it has been read: nothing else would make the window draw again."""
+    clip = Counted(path=Path("a"), width=2, height=2, bits=8, alpha=False, pixel_format="rgb24", fps=RATE, frames=5)
+    reel = Reel(clip, lambda picture: picture.pixels)
+    reel.want(3, runs=False)
+    deadline = time.monotonic() + 60
+    while ((best := reel.best()) is None or best[0] != 3) and time.monotonic() < deadline:
+        time.sleep(0.001)
+    assert (reel.awaits(2), reel.awaits(3)) == (True, False)
+    reel.close()
 
 
 @pytest.mark.parametrize("runs", [True, False])

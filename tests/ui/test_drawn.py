@@ -23,7 +23,8 @@ from app.ui.browser import Browser
 from app.ui.dialogs import PictureOrMap, Unsaved
 from app.ui.editor_state import SELECT_BY
 from app.ui.events import Mods
-from app.ui.export_dialog import ANIMATION, MAP, ExportDialog
+from app.ui.export_choices import ANIMATION, MAP
+from app.ui.export_dialog import ExportDialog
 from app.ui.preferences import Preferences
 from app.ui.saving import SaveDialog
 from app.work import playing, recording
@@ -184,8 +185,8 @@ def dialogs(robot: Robot) -> Iterator[str]:
     assert isinstance(asked, ExportDialog)
     asked.folder = Path("folder")
     for kind, number, variant in (*((0, n, 0) for n in range(2)), (ANIMATION, 0, 1), (ANIMATION, 5, 0), (MAP, 0, 0)):
-        asked.kind, asked.format[kind], asked.variant[kind][number] = kind, number, variant
-        asked.finer = 1
+        asked.choices.kind, asked.choices.format[kind], asked.choices.variant[kind][number] = kind, number, variant
+        asked.choices.finer = 1
         robot.frame(count=3)
         yield f"export {kind} {number}"
     asked.close()

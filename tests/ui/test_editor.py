@@ -35,7 +35,8 @@ from app.ui.browser import Browser
 from app.ui.canvas import MOVING, shown_pixels
 from app.ui.dialogs import PictureOrMap, Preferring, Unsaved
 from app.ui.events import MIDDLE, RIGHT, Button, CloseWish, Drop, Key, Mods, Move
-from app.ui.export_dialog import ANIMATION, KINDS, MAP, ExportDialog, StillExporting
+from app.ui.export_choices import ANIMATION, KINDS, MAP
+from app.ui.export_dialog import ExportDialog, StillExporting
 from app.ui.files import fresh_recipe, load_any
 from app.ui.key_sheet import KeySheet
 from app.ui.numbers import Numbers
@@ -997,8 +998,8 @@ def test_a_map_exported_from_the_window_is_the_command_line_s(
     for format_, file in enumerate(KINDS[MAP][1]):
         ending = file.variants[0].ending
         dialog = export_dialog(robot, tmp_path)
-        dialog.kind, dialog.name, dialog.forward, dialog.size = MAP, "m", forward, 120
-        dialog.format[MAP] = format_
+        dialog.choices.kind, dialog.name, dialog.choices.forward, dialog.choices.size = MAP, "m", forward, 120
+        dialog.choices.format[MAP] = format_
         if format_:
             run(robot.device, dialog.job(), Progress())
         else:  # in a process of its own, as the window does it
@@ -1032,7 +1033,7 @@ def test_an_export_can_be_cancelled(robot: Robot, tmp_path: Path) -> None:
     robot.drag((0.3, 0.4), (0.45, 0.4))
     robot.rest()
     dialog = export_dialog(robot, tmp_path)
-    dialog.kind = ANIMATION
+    dialog.choices.kind = ANIMATION
     robot.editor.exports.start(dialog.job())
     robot.frame(count=2)
     robot.editor.exports.cancel()
@@ -1141,7 +1142,7 @@ def test_leaving_asks_about_an_export_that_is_running(robot: Robot, tmp_path: Pa
     robot.rest()
     assert robot.editor.files.save_as(tmp_path / "work.fluidwarp")
     dialog = export_dialog(robot, tmp_path)
-    dialog.kind, dialog.fps = ANIMATION, 60
+    dialog.choices.kind, dialog.choices.fps = ANIMATION, 60
     for answer in ("cancel", "wait"):
         robot.editor.exports.start(dialog.job())
         robot.frame(CloseWish())

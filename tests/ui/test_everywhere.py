@@ -15,7 +15,8 @@ from app.ui.actions import ACTIONS
 from app.ui.browser import Browser
 from app.ui.dialogs import Dialog, PictureOrMap, Preferring, Unsaved
 from app.ui.editor_state import SELECT_BY
-from app.ui.export_dialog import KINDS, ExportDialog
+from app.ui.export_choices import KINDS
+from app.ui.export_dialog import ExportDialog
 from app.ui.key_sheet import KeySheet
 from app.ui.preferences import Preferences
 from app.ui.saving import SaveDialog
@@ -110,9 +111,9 @@ def over(robot: Robot, places: dict[str, tuple[float, float]]) -> Iterator[str]:
     asked = editor.dialogs.shown[-1]
     assert isinstance(asked, ExportDialog)
     for kind, (label, files) in enumerate(KINDS):
-        asked.kind = kind
+        asked.choices.kind = kind
         for number, file in enumerate(files):
-            asked.format[kind], asked.finer = number, number % 2
+            asked.choices.format[kind], asked.choices.finer = number, number % 2
             yield f"export {label} {file.name}"
     yield from ended(robot, asked)
     project = editor.session.project

@@ -22,7 +22,8 @@ from app.model.recipe import Output
 from app.model.strokes import BrushPath, Change
 from app.progress import Progress
 from app.ui.events import LEFT, Button, Move
-from app.ui.export_dialog import ANIMATION, KINDS, MAP, PICTURE, PICTURES, PRESETS, ExportDialog
+from app.ui.export_choices import ANIMATION, KINDS, MAP, PICTURE, PICTURES, PRESETS
+from app.ui.export_dialog import ExportDialog
 from app.ui.files import load_any
 from app.ui.panels import inspector
 from app.ui.preferences import Preferences
@@ -348,7 +349,7 @@ def test_a_preset_chooses_all_that_it_says(
     preset = PRESETS[number]
     widgets.click(preset.name)
     assert dialog.preset == number
-    assert dialog.file_kind is KINDS[preset.kind][1][preset.format]
+    assert dialog.choices.file_kind is KINDS[preset.kind][1][preset.format]
     dialog.folder = tmp_path
     job = dialog.job()
     job.check()
@@ -394,7 +395,7 @@ def test_an_exported_picture_is_what_is_asked_for(robot: Robot, dialog: ExportDi
     widgets.type("Quality", "35")
     widgets.type("Size", "120")
     grid = robot.editor.session.recipe.fluid.grid
-    assert (dialog.kind, dialog.job().recipe.fluid.grid) == (PICTURE, grid)
+    assert (dialog.choices.kind, dialog.job().recipe.fluid.grid) == (PICTURE, grid)
     widgets.click("2 x")
     job = dialog.job()
     assert (job.target.suffix, job.recipe.output.quality, job.recipe.output.size) == (".jpg", 35, 120)
@@ -420,7 +421,7 @@ def test_an_exported_animation_is_what_is_asked_for(robot: Robot, dialog: Export
     widgets.type("From", "0.1")
     widgets.type("To", "0.2")
     job = dialog.job()
-    assert dialog.kind == ANIMATION
+    assert dialog.choices.kind == ANIMATION
     assert (job.recipe.output.fps, job.recipe.time.start, job.recipe.time.end) == pytest.approx((24, 0.1, 0.2))
 
 
@@ -464,7 +465,7 @@ def test_an_exported_map_is_what_is_asked_for(robot: Robot, dialog: ExportDialog
     widgets.click("Warp map")
     maps = dialog.job().outputs.maps
     assert maps is not None
-    assert (dialog.kind, maps.kind, maps.forward, maps.path.suffix) == (MAP, "st", False, ".exr")
+    assert (dialog.choices.kind, maps.kind, maps.forward, maps.path.suffix) == (MAP, "st", False, ".exr")
     widgets.click("TIFF")
     widgets.click("From the original")
     widgets.click("Offsets in pixels")
@@ -482,7 +483,11 @@ def test_every_file_that_the_command_line_writes_can_be_exported(robot: Robot, t
     for kind, (_, files) in enumerate(KINDS):
         for number, file in enumerate(files):
             for variant in range(len(file.variants)):
-                dialog.kind, dialog.format[kind], dialog.variant[kind][number] = kind, number, variant
+                dialog.choices.kind, dialog.choices.format[kind], dialog.choices.variant[kind][number] = (
+                    kind,
+                    number,
+                    variant,
+                )
                 job = dialog.job()
                 job.check()
                 assert job.is_animation == (kind == ANIMATION)
@@ -501,9 +506,9 @@ def test_the_next_export_begins_with_the_kind_of_the_last(robot: Robot, tmp_path
     preferences.exported(tmp_path / "a.webm", "Animation WebM")
     editor = robot.editor
     dialog = ExportDialog(editor.session, editor.exports, editor.chooser, preferences)
-    assert (dialog.kind, dialog.ending) == (ANIMATION, ".webm")
+    assert (dialog.choices.kind, dialog.ending) == (ANIMATION, ".webm")
     preferences.export_as = "Something of another version"
-    assert ExportDialog(editor.session, editor.exports, editor.chooser, preferences).kind == PICTURE
+    assert ExportDialog(editor.session, editor.exports, editor.chooser, preferences).choices.kind == PICTURE
 
 
 def test_the_next_export_of_a_work_begins_with_what_was_chosen_for_the_last(
@@ -530,7 +535,7 @@ def test_the_next_export_of_a_work_begins_with_what_was_chosen_for_the_last(
         return asked
 
     widgets.click("Loop")
-    dialog.size, dialog.quality, dialog.fps, dialog.name, dialog.start = 160, 70, 24, "sky", 0.1
+    dialog.choices.size, dialog.choices.quality, dialog.choices.fps, dialog.name, dialog.start = 160, 70, 24, "sky", 0.1
     first = export(dialog)
     again = ask()
     assert again.start == 0.0
@@ -545,12 +550,19 @@ def test_the_next_export_of_a_work_begins_with_what_was_chosen_for_the_last(
     export(third)
     editor.session.project = replace(editor.session.project, path=tmp_path / "called.fluidwarp")
     fourth = ask()
-    assert (fourth.kind, fourth.name) == (MAP, "called map")
+    assert (fourth.choices.kind, fourth.name) == (MAP, "called map")
+    # What is chosen and then not exported is forgotten.
+    fourth.choices.format[MAP] = 2
+    fourth.choices.variant[PICTURE][0] = 1
+    robot.key("escape")
+    robot.frame(count=3)
+    fifth = ask()
+    assert (fifth.choices.format, fifth.choices.variant) == (third.choices.format, third.choices.variant)
     # Of another picture the size means something else.
     robot.key("escape")
     robot.frame(count=3)
-    editor.exports.chosen[editor.session] = (1, 1), {"size": 160}
-    assert ask().size == dialog.picture.width
+    editor.exports.chosen[editor.session] = replace(third.choices, extent=(1, 1))
+    assert ask().choices.size == dialog.picture.width
 
 
 @pytest.mark.parametrize("ending", [".mp4", ".mkv", ".gif", ".%04d.png"])
@@ -558,7 +570,7 @@ def test_the_size_that_is_told_of_an_animation_is_the_one_that_is_written(
     device: Device, dialog: ExportDialog, tmp_path: Path, ending: str
 ) -> None:
     """Some kinds of file have no odd sides: their last pixels are repeated."""
-    dialog.kind, dialog.folder, dialog.name, dialog.size, dialog.fps, dialog.end = (
+    dialog.choices.kind, dialog.folder, dialog.name, dialog.choices.size, dialog.choices.fps, dialog.end = (
         ANIMATION,
         tmp_path,
         "a",
@@ -566,7 +578,7 @@ def test_the_size_that_is_told_of_an_animation_is_the_one_that_is_written(
         10.0,
         0.2,
     )
-    dialog.format[ANIMATION] = next(
+    dialog.choices.format[ANIMATION] = next(
         n for n, file in enumerate(KINDS[ANIMATION][1]) if file.variants[0].ending == ending
     )
     run(device, dialog.job(), Progress())
@@ -590,7 +602,7 @@ def test_of_linear_light_a_kind_is_proposed_that_holds_it(robot: Robot, monkeypa
     for picture, keeping in ((light, {"TIFF", "EXR"}), (eight, {file.name for file in PICTURES})):
         dialog = asked(picture, "")
         for number, file in enumerate(PICTURES):
-            dialog.format[PICTURE] = number
+            dialog.choices.format[PICTURE] = number
             assert (dialog.use == file.use) == (file.name in keeping)
 
 

@@ -23,7 +23,8 @@ from app.ui.chooser import FileChooser
 from app.ui.clock import FRAMES, HOVERING, PACE
 from app.ui.editor import Editor
 from app.ui.events import LEFT, Button, Event, Key, Mods, Move, Text, Wheel
-from app.ui.export_dialog import ANIMATION, ExportDialog
+from app.ui.export_choices import ANIMATION
+from app.ui.export_dialog import ExportDialog
 from app.ui.files import load_any
 from app.ui.layout import Layout
 from app.ui.panels.hud import BEHIND
@@ -256,6 +257,26 @@ def test_clicks_and_keys_that_come_all_at_once_are_heard_one_after_the_other(rob
     assert robot.editor.state.tool_name == "twirl"
 
 
+@pytest.mark.parametrize("action", [None, "export"])
+def test_keys_that_come_with_the_one_that_leaves_a_field_wait_for_that(robot: Robot, action: str | None) -> None:
+    """Into a field that is typed in: a number, Enter or the key of an action that has no Ctrl, and keys after it."""
+    rect = robot.editor.layout.inspector
+    assert rect is not None
+    ctrl_click(robot, rect.x + 120, rect.y + 111)
+    robot.frame(count=5)
+    left = ["enter"]
+    if action:
+        robot.editor.keys.set(action, "f9")
+        left = ["f9", "escape"]
+    typed = [event for letter in "0.7" for event in (Key(letter, True), Text(letter), Key(letter, False))]
+    keys = [Key(key, down) for key in left for down in (True, False)]
+    robot.frame(*typed, *keys, Key("t", True), Text("t"), Key("t", False), dt=0.5)
+    robot.frame(count=30)
+    assert robot.editor.session.recipe.fluid.viscosity == pytest.approx(0.7)
+    assert robot.editor.state.tool_name == "twirl"
+    assert not robot.editor.dialogs.shown
+
+
 @pytest.mark.parametrize("together", [True, False], ids=["click", "release"])
 def test_a_stroke_that_comes_together_with_the_click_on_its_tool_is_drawn_with_it(robot: Robot, together: bool) -> None:
     """Also if only the release of that click comes with the stroke, as a button acts when it is let go of."""
@@ -336,9 +357,9 @@ def test_the_size_of_an_export_is_typed_as_it_is_shown(
     robot.frame(count=3)
     dialog = robot.editor.dialogs.shown[-1]
     assert isinstance(dialog, ExportDialog)
-    assert dialog.size == 240
+    assert dialog.choices.size == 240
     type_into(robot, dialog.rect.x + 250, dialog.rect.y + 238, f"{typed} pixels")
-    assert dialog.size == 120
+    assert dialog.choices.size == 120
     robot.close()
 
 
@@ -374,7 +395,7 @@ def test_enter_ends_the_typing_in_an_export_field_and_starts_nothing(robot: Robo
     dialog = robot.editor.dialogs.shown[-1]
     assert isinstance(dialog, ExportDialog)
     type_into(robot, dialog.rect.x + 250, dialog.rect.y + 238, "100")
-    assert dialog.size == 100
+    assert dialog.choices.size == 100
     assert not robot.editor.exports.is_running
     robot.click(dialog.rect.x + 100, dialog.rect.y + 397)
     robot.key("end")
@@ -550,7 +571,7 @@ def test_the_head_of_a_dialog_stays_where_it_is(device: Device, tmp_path: Path, 
     for kind in (1, 2, 0, 1):
         robot.click(dialog.rect.x + 100 + 150 * kind, top + 109)
         robot.frame(count=5)
-        assert dialog.kind == kind
+        assert dialog.choices.kind == kind
         assert dialog.rect.y == top
         assert dialog.rect.bottom <= size[1]
         heights.add(dialog.rect.height)
@@ -802,7 +823,7 @@ def test_the_end_of_every_dialog_is_reached_in_a_small_window(small: Robot) -> N
     small.frame(count=4)
     dialog = small.editor.dialogs.shown[-1]
     assert isinstance(dialog, ExportDialog)
-    dialog.kind = ANIMATION
+    dialog.choices.kind = ANIMATION
     small.frame(count=4)
     assert dialog.rect.bottom <= small.size[1]
     assert dialog.rect.y >= 0
