@@ -65,7 +65,7 @@ def main() -> None:
         if sys.argv[1:] == ["--version"]:  # without pydantic, which typer loads for any option, and takes as long again
             _print_version()
         else:
-            cli()
+            sys.exit(cli(standalone_mode=False))
     except UserError as error:
         _fail(str(error), error.status)
     except Cancelled:
@@ -81,11 +81,20 @@ def main() -> None:
     except Exception as error:
         if any(kind.__name__ == "ContextError" for kind in type(error).__mro__):  # without the time to import it
             _fail(f"{error}; `fluidwarp doctor` tells more", 1)
+        if hasattr(error, "format_message"):  # click's; under which name typer has it depends on the release
+            _fail(_usage(error), 2)
         if os.environ.get("FLUIDWARP_TRACEBACK"):
             raise
         words = str(error).strip().splitlines()
         said = f": {words[0]}" if words else ""
         _fail(f"this is a bug in fluidwarp ({type(error).__name__}{said}); FLUIDWARP_TRACEBACK=1 shows where", 70)
+
+
+def _usage(error: Any) -> str:
+    """What is wrong with the words of a command line, and where they are explained."""
+    said, context = error.format_message().rstrip("."), getattr(error, "ctx", None)
+    command = "" if context is None or context.parent is None else f" {context.info_name}"
+    return f"{said[:1].lower()}{said[1:]}; `fluidwarp{command} --help` explains what is wanted"
 
 
 def _print_version() -> None:

@@ -282,11 +282,47 @@ def test_a_file_alone_is_what_the_editor_opens(
     assert opened == [name and Path(name)]
 
 
+@pytest.mark.parametrize("command", ["edit", "render", "fit", "apply", "convert", "gallery", "doctor"])
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--bogus"], "no such option: --bogus"),
+        (["--bogus=\x1b[2J"], "no such option: --bogus"),
+        (["a", "b", "c", "--gpu", "-1"], ""),
+    ],
+    ids=["option", "control characters", "value or too many"],
+)
+def test_wrong_words_of_a_command_are_told_in_one_line(
+    command: str, words: list[str], said: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["fluidwarp", command, *words])
+    with pytest.raises(SystemExit) as ended:
+        cli.main()
+    told = capsys.readouterr()
+    assert (ended.value.code, told.out) == (2, "")
+    assert told.err.startswith(f"fluidwarp: {said}")
+    assert told.err.endswith(f"`fluidwarp {command} --help` explains what is wanted\n")
+    assert told.err.count("\n") == 1
+    assert "\x1b" not in told.err
+
+
+@pytest.mark.parametrize("words", [["render"], ["render", "-o"], ["--bogus"], ["fit", "x.toml"]])
+def test_missing_words_are_told_in_one_line(
+    words: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["fluidwarp", *words])
+    with pytest.raises(SystemExit) as ended:
+        cli.main()
+    told = capsys.readouterr()
+    assert (ended.value.code, told.out, told.err.count("\n")) == (2, "", 1)
+    assert "--help` explains what is wanted" in told.err
+
+
 # -- what does not ----------------------------------------------------------------------------------------------------
 
 
 def test_a_mistake_of_ours_has_a_status_of_its_own(folder: Path):
-    broken = "import app.cli\napp.cli.cli = lambda: 1 / 0\napp.cli.main()"
+    broken = "import app.cli\napp.cli.cli = lambda **_: 1 / 0\napp.cli.main()"
     ran = subprocess.run(
         [sys.executable, "-c", broken],
         cwd=folder,
