@@ -46,7 +46,7 @@ samples = [[0, 0.3, 0.5, 1.0], [5, 0.6, 0.5, 1.0]]
 fps = 30
 """
 OLD = b"what was there before\n" * 400
-RESULTS = "out.png", "out.exr", "out.mp4", "out.gif", "frames.%04d.png", "frames.%04d.exr"
+RESULTS = "out.png", "out.exr", "out.tif", "out.mp4", "out.gif", "frames.%04d.png", "frames.%04d.exr"
 BACKUP, SAID = "work.fluidwarp~", "tmp.said"
 PATIENCE = 60.0  # seconds for what a killed process has begun to end
 

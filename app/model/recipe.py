@@ -23,6 +23,7 @@ from app.model.validation import complaint
 
 VERSION = 5
 MOST_TICKS = 1_000_000
+MOST_WATCHED = 100  # points, sought after every tick
 FINEST_GRID = 4096  # cells along the longer side
 _SAMPLES = "\ue000 samples"  # a character that nobody writes
 
@@ -109,7 +110,7 @@ class Stop(Model):
     displacement_above: Annotated[float, Field(gt=0)] | None = None
     det_below: Annotated[float, Field(lt=1)] | None = None
     handles_within: Annotated[float, Field(gt=0, le=1)] | None = None
-    watch: Several[Watch] = ()
+    watch: Annotated[Several[Watch], Field(max_length=MOST_WATCHED)] = ()
 
 
 class Playback(Model):
