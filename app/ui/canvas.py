@@ -147,7 +147,10 @@ class Canvas:
         if replay.density is not None:
             inputs["picture"] = replay.density.values.texture
         elif not state.before:
-            inputs["displacement"], inputs["shown"], picture = self._seen(session, state, viewport, seen, inputs, level)
+            is_on_it = seen[0] < target.width and seen[3] > height - target.height
+            inputs["displacement"], inputs["shown"], picture = self._seen(
+                session, state, viewport, seen, inputs, level, is_on_it
+            )
             if picture is not None:
                 inputs |= {"seen": picture, **corner}
                 defines["SEEN"] = 1
@@ -254,7 +257,14 @@ class Canvas:
         return fields
 
     def _seen(
-        self, session: Session, state: EditorState, viewport: Viewport, seen: Pixels, inputs: dict[str, Any], level: int
+        self,
+        session: Session,
+        state: EditorState,
+        viewport: Viewport,
+        seen: Pixels,
+        inputs: dict[str, Any],
+        level: int,
+        is_on_target: bool,
     ) -> tuple[Field, tuple[float, ...], Field | None]:
         """The displacement to show, where it lies, 0-1 of the picture, and the picture through it if that is drawn.
 
@@ -281,7 +291,7 @@ class Canvas:
         apart = max(1, whole[0] // warp.size_for(self.size, whole)[0])
         if not (session.is_moving or state.is_scaling):
             at_rest = lattice(apart)
-            if (picture := self._picture(session, at_rest, apart, seen, inputs, level)) is not None:
+            if (picture := self._picture(session, at_rest, apart, seen, inputs, level, is_on_target)) is not None:
                 self._last = self._fields["displacement"], at_rest.shown
                 return *self._last, picture
         moving = lattice(max(apart, MOVING))
@@ -293,13 +303,21 @@ class Canvas:
         return *self._last, None
 
     def _picture(
-        self, session: Session, lattice: Lattice, apart: int, seen: Pixels, inputs: dict[str, Any], level: int
+        self,
+        session: Session,
+        lattice: Lattice,
+        apart: int,
+        seen: Pixels,
+        inputs: dict[str, Any],
+        level: int,
+        is_on_target: bool,
     ) -> Field | None:
         """The picture at the pixels that are `seen` as an export has it; None until the last part has been drawn.
 
         Args:
             lattice: of the displacement for it, `apart` pixels from one texel to the next.
             level: how often the picture is halved.
+            is_on_target: the target has some of them; else they are not drawn.
         """
         left, top, right, bottom = seen
         height, step = bottom - top, inputs["step"]
@@ -309,9 +327,12 @@ class Canvas:
         warp, edges = session.seen, EDGES[session.recipe.edges]
         displacement = self._fields.get("displacement", lattice.size, 2)
         layer = self._fields.get("picture", (right - left, height), 4, "f1")
-        if (drawn := (displacement, layer, warp, warp.version, self._texture.filter, edges, numbers)) != self._resting:
+        drawn = displacement, layer, warp, warp.version, self._texture.filter, edges, numbers, is_on_target
+        if drawn != self._resting:
             self._resting, self._parts = drawn, 0
-        if self.is_unfinished:
+        if self.is_unfinished and not is_on_target:
+            self._parts += 1
+        elif self.is_unfinished:
             strips = [(first, min(first + ROWS, height)) for first in range(self._parts * ROWS, height, PARTS * ROWS)]
             # Of the displacement a strip takes what lies beside its pixels too, to be interpolated between.
             rows = [(start // apart, -(-end // apart) + 2) for start, end in strips]

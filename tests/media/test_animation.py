@@ -231,6 +231,17 @@ def test_the_frames_come_back(tmp_path: Path, ending: str, dtype: type, channels
         assert np.quantile(difference[shown], 0.9) <= tolerance
 
 
+def test_a_gif_of_a_few_colours_too_many_is_near_all_of_them(tmp_path: Path):
+    """256 to 511 in all: no palette holds them, and none is taken for one."""
+    red, green = np.mgrid[0:15, 0:20].astype(np.uint8) * 12
+    frame = np.stack([red, green, 0 * red + 128], axis=-1)
+    with animation_writer(tmp_path / "a.gif", 10) as write:
+        write(frame)
+        write(frame[::-1])
+    seen, *_ = read_clip(tmp_path / "a.gif").read_frames()
+    assert np.abs(seen[..., :3].astype(int) - frame).mean() < 8
+
+
 def test_alpha_is_laid_over_black_where_a_format_has_none(tmp_path: Path):
     frame = np.full((16, 16, 4), (200, 100, 50, 128), np.uint8)
     with animation_writer(tmp_path / "a.mp4", 10) as write:

@@ -155,6 +155,7 @@ def test_save_and_load(tmp_path: Path):
         ("[[stop.watch]]\npoint = [0.1, 0.1]", "stop.watch[1]: give either 'distance' or 'place'"),
         ("[[stroke]]\ntool = 'push'\nsamples = []", "line 3: stroke[1]: 'samples' must be a list of at least 1"),
         ("[[stroke]]\ntool = 'pish'\nsamples = [[0, 0, 0, 1]]", "'tool' must be one of 'push'"),
+        ("[[force]]\nkind = 'whirl'", ", not 'whirl'"),
         ("[[stroke]]\ntool = 'push'\nradius = 0\nsamples = [[0, 0, 0, 1]]", "'radius' must be at least 1e-06, not 0"),
         (
             "[[stroke]]\ntool = 'push'\nradius = 1e-7\nsamples = [[0, 0, 0, 1]]",

@@ -17,6 +17,7 @@ from PIL import Image
 
 from solver.gl.context import GPU, ContextError, NoSuchDevice
 from solver.gl.device import MOST_PASSES, Device
+from solver.gl.field import FieldPool
 from solver.gl.passes import Pass
 from support.gl_objects import living
 
@@ -234,3 +235,13 @@ def test_of_many_passes_those_used_last_stay_compiled_and_the_others_are_compile
         held(field, field=source, offset=(0.0, 0.0))
         assert (field.get() == 3).all()
         assert copied(0) is not first
+
+
+def test_a_field_of_a_pool_is_another_where_anything_of_it_is(device: Device) -> None:
+    pool = FieldPool(device, "pool")
+    field = pool.get("role", (4, 3), 1)
+    assert pool.get("role", (4, 3), 1) is field
+    for size, components, dtype in (((3, 4), 1, "f4"), ((3, 4), 2, "f4"), ((3, 4), 2, "f1")):
+        other = pool.get("role", size, components, dtype)
+        assert (other.size, other.components, other.dtype) == (size, components, dtype)
+    pool.release()

@@ -68,7 +68,8 @@ def write_foreign_map(path: Path, width: int, height: int, names: str = "RGB") -
 class Robot:
     """An editor with a framebuffer, and a pointer and keys to use it with.
 
-    Until `see` is called only one pixel of each frame is drawn, which leaves out five sixths of its cost.
+    Until `see` is called, or unless it `sees` from the beginning, only one pixel of each frame is drawn, and nothing of
+    the picture at rest: most of a frame's cost.
     """
 
     def __init__(
@@ -80,10 +81,11 @@ class Robot:
         preferences: Preferences | None = None,
         density: float = 1.0,
         journals: Path | None = None,
+        sees: bool = False,
     ) -> None:
         self.device, self.scale, self.density = device, scale, density
         self.size = size = round(size[0] * density), round(size[1] * density)
-        self.target = self._framebuffer((1, 1))
+        self.target = self._framebuffer(size if sees else (1, 1))
         self.editor = Editor(device, project, preferences or Preferences(auto_quality=False), journals)
         imgui.get_io().config_error_recovery_enable_assert = True  # what was begun and not ended, say
         self.mods = Mods()

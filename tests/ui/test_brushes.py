@@ -55,7 +55,8 @@ def test_kept_brushes_that_cannot_be_are_made_so_that_they_can(robot: Robot, tmp
     path = tmp_path / "kept" / "preferences.json"
     path.parent.mkdir(exist_ok=True)
     path.write_text(
-        """{"brushes": {"push": {"radius": 99, "hardness": -1, "strength": NaN, "no": 1}, "no tool": {}, "twirl": 3},
+        """{"brushes": {"push": {"radius": 99, "hardness": -1, "strength": NaN, "no": 1}, "no tool": {}, "twirl": 3,
+        "freeze": {"radius": "1", "hardness": 1e10}},
         "presets": {"mine": {"radius": 1e300}, "\\ud800": {}, "": {}}, "stabiliser": 1e9, "sections": {"view": 1},
         "keys": {"open": "k", "x": [1], "undo": ["\\ud800"]}, "window": [0, 0, 1%s, 600, 0]}"""
         % (400 * "0")
@@ -63,6 +64,7 @@ def test_kept_brushes_that_cannot_be_are_made_so_that_they_can(robot: Robot, tmp
     kept = Preferences.load()
     state = EditorState.recalled(kept)
     assert (state.brush.radius, state.brush.hardness, state.brush.strength) == (0.5, 0, 1)
+    assert kept.brushes["freeze"] == {}
     assert (kept.stabiliser, kept.window, kept.keys, kept.sections) == (200, [], {}, {})
     assert [(preset.name, preset.radius) for preset in presets(kept)[len(BRUSHES) :]] == [("mine", 0.15)]
 

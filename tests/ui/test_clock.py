@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from app.ui.clock import Clock
+from support.editing import Robot
 
 
 def test_a_movement_begins_at_once_and_keeps_its_pace() -> None:
@@ -50,3 +51,9 @@ def test_parts_of_a_frame_are_told_in_smoothed_milliseconds(monkeypatch: pytest.
         with clock.measure("draw"):
             pass
         assert clock.milliseconds["draw"] == pytest.approx(wanted)
+
+
+def test_what_each_part_of_a_frame_takes_is_told_by_its_name(robot: Robot) -> None:
+    """The statistics and the lines over the canvas show these names."""
+    robot.drag((0.4, 0.5), (0.5, 0.5), steps=3)
+    assert set(robot.editor.clock.milliseconds) == {"frame", "simulate", "canvas", "panels", "interface"}

@@ -97,6 +97,43 @@ def test_a_slider_of_the_fluid_sets_its_number(
     assert session.document.history.entries[-1].name == label
 
 
+def test_the_middle_of_the_viscosity_is_that_of_its_decades(robot: Robot, widgets: Widgets) -> None:
+    only(robot, "fluid")
+    widgets.click("Viscosity")
+    assert robot.editor.session.recipe.fluid.viscosity == pytest.approx(1e-2, rel=0.1)  # of 1e-5 to 10
+
+
+def test_a_map_that_work_starts_from_is_told_and_left_whatever_has_been_painted(
+    robot: Robot, widgets: Widgets, tmp_path: Path
+) -> None:
+    np.save(tmp_path / "m.npy", np.full((180, 240, 2), 0.01, np.float32))
+    robot.editor.files.start_from_map(tmp_path / "m.npy")
+    robot.until(lambda: not robot.editor.files.is_loading)
+    robot.drag((0.4, 0.5), (0.5, 0.5), steps=3)
+    robot.rest()
+    only(robot, "quality")
+    widgets.click("Start from the picture")
+    assert robot.editor.session.recipe.map is None
+    assert robot.editor.session.recipe.stroke
+
+
+def test_a_picture_that_is_opened_begins_with_the_fluid_as_it_is_now(
+    robot: Robot, widgets: Widgets, tmp_path: Path
+) -> None:
+    """As it has been set in the middle of the work, not as the work began."""
+    robot.drag((0.4, 0.5), (0.45, 0.5), steps=2)
+    robot.rest()
+    only(robot, "fluid")
+    widgets.type("Viscosity", "1.25")
+    robot.rest()
+    assert robot.editor.session.recipe.fluid.viscosity != 1.25
+    write_picture(tmp_path / "other.png", Picture(np.zeros((48, 64, 3), np.uint8)))
+    robot.drop(tmp_path / "other.png")
+    widgets.click("Don't save")
+    assert robot.editor.session.project.picture.width == 64
+    assert robot.editor.session.recipe.fluid.viscosity == 1.25
+
+
 def test_edges_of_the_fluid_are_what_is_pressed(robot: Robot, widgets: Widgets) -> None:
     for words, walls in (("Edges hold", "no-slip"), ("Edges glide", "free-slip")):
         widgets.click(words)

@@ -91,7 +91,7 @@ def test_a_walk_leads_where_it_did(
     if not WRITES and not golden.has(name):
         pytest.skip("letters lie elsewhere in other versions of imgui")
     found: dict[str, list[float]] = {}
-    with Robot(device, small_project(tmp_path, 32), SIZE) as robot:
+    with Robot(device, small_project(tmp_path, 32), SIZE, sees=True) as robot:
         state = robot.editor.state
         if number:
             robot.drag((0.3, 0.4), (0.5, 0.5), steps=4)

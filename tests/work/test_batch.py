@@ -23,8 +23,10 @@ import pytest
 
 from app.errors import Cancelled, UserError
 from app.media import files
+from app.media.auxiliary import Pictures
 from app.media.pictures import read_picture, write_picture
 from app.model.picture import Picture
+from app.model.recipe import Recipe
 from app.progress import INTERRUPTED, Progress
 from app.work import cluster, states, worker
 from app.work.batch import run_batch
@@ -566,6 +568,25 @@ def test_states_of_something_else_are_not_taken(folder: Path, monkeypatch: pytes
     assert steps == 6  # from 4
     told = ["it is of another simulation", "it is compressed"]
     assert [[why in notice for why in told] for notice in outcome.notices] == [[True, False], [False, True]]
+
+
+def test_states_of_another_driver_or_version_of_it_are_not_taken(
+    device: Device, folder: Path, monkeypatch: pytest.MonkeyPatch
+):
+    def stored() -> tuple[Replay, states.StoredStates]:
+        replay = Replay(device, Recipe.parse(RECIPE), Pictures(read_picture(folder / "p0.png")), budget=0)
+        return replay, states.StoredStates(folder / "states", replay, pytest.fail)
+
+    replay, kept = stored()
+    replay.seek(2)
+    kept.keep(last=True)
+    replay.release()
+    for change, is_found in (({}, True), ({"renderer": "another"}, False), ({"version": "another"}, False)):
+        with monkeypatch.context() as driver:
+            driver.setattr(device, "limits", replace(device.limits, **change))
+            replay, kept = stored()
+            assert kept.resume(5) is is_found
+            replay.release()
 
 
 def newest(folder: Path) -> Path:

@@ -252,6 +252,9 @@ def test_a_far_way_has_a_radius_as_large_as_it_needs(device: Device):
     """Half of the way and more, where that leaves nothing to search; of what is turned about a point too."""
     far = fit(device, np.array([[[0.0, 0.5], [1.0, 0.5]]]), 1, FREE.replace("grid = 32", "grid = 8")).trial.recipe
     assert far.handle[0].radius == pytest.approx(0.505)
+    pairs = np.array([[[0.1, 0.1], [0.12, 0.1]], [[0.0, 0.8], [1.0, 0.8]]])
+    near, far = fit(device, pairs, 1, FREE.replace("grid = 32", "grid = 8")).trial.recipe.handle
+    assert near.radius < 0.4 < far.radius, "each has its own"
     turned = "[[handle]]\nat = [0.2, 0.5]\nto = [0.8, 0.5]\nrotate = 20.0\nradius = 0.1\n"
     ring = fit(device, None, 1, FREE.replace("grid = 32", "grid = 8") + turned).trial.recipe
     assert ring.handle[0].radius > 0.3

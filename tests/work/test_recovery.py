@@ -639,6 +639,18 @@ def test_restored_work_is_as_it_was_and_unsaved(
     assert found_in(starter.root).work.strokes == 3
 
 
+@pytest.mark.usefixtures("before")
+def test_of_several_works_the_one_whose_button_is_pressed_is_restored(starter: Starter, tmp_path: Path) -> None:
+    robot = starter.start(tmp_path)
+    answer(robot, "Later")
+    robot.drag((0.3, 0.4), (0.45, 0.4))
+    robot.rest()
+    robot = starter.start(tmp_path)
+    answer(robot, "Restore")  # the first row: the newest
+    assert robot.editor.dialogs.shown == []
+    assert len(robot.editor.session.document.recipe.stroke) == 1
+
+
 @pytest.mark.parametrize("is_automatic", [True, False])
 def test_restored_work_has_the_choice_of_its_grid(starter: Starter, tmp_path: Path, is_automatic: bool) -> None:
     robot = starter.start(tmp_path)

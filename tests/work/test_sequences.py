@@ -356,6 +356,7 @@ def test_what_of_a_sequence_is_not_used_is_told(folder: Path):
         "plate.####.exr: of its 4 frames only the first is used"
     )
     (folder / "plate.-001.exr").touch()
+    (folder / "plate.-002.exr.txt").touch()
     assert open_source(folder / "plate.####.exr").picture.note == (
         "plate.####.exr: of 1 files with numbers below 0 none is used"
     )
