@@ -438,7 +438,7 @@ def test_what_has_let_go_is_asked_for_nothing_unless_its_way_was_not_over(device
     [
         (0.1, 3.0, 0.0, "its reach (radius) is too small to go that far", False),
         (0.03, 0.8, 0.0, "it reaches over only 1.9 cells of the simulation; give it a larger reach (radius)", False),
-        (0.03, 1.5, 1.0, "the picture around it is bent as far as it bears", True),
+        (0.03, 1.8, 1.0, "the picture around it is bent as far as it bears", True),
         (0.2, 1.9, 0.0, "the picture around it is bent as far as it bears", True),
     ],
     ids=["too far", "small", "small and local", "neither"],
