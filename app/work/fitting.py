@@ -171,8 +171,9 @@ def fitted(
     progress.total = evaluations + search.fine.cost * (fine + len(parts))
     stopped = False
     try:
-        search.trial(search.coarse, search.start)  # soon there is something to stop with
-        search.trial(search.fine, search.start)
+        for start in search.starts:  # soon there is something to stop with
+            search.trial(search.coarse, start)
+        search.trial(search.fine, search.coarse.best)
         for number, (directions, reach) in enumerate(parts):
             left = evaluations - search.coarse.replays
             search.run(search.coarse, search.coarse.best, directions, reach, left // (len(parts) - number))
@@ -495,11 +496,13 @@ class _Search:
         self.high = listed(np.where(rings, least, np.maximum(least, bent)), high[0], high[1], max(high[2], own))
         if _flows(base):
             self.low[-1] = self.high[-1] = np.log(own)
-        first = listed(np.maximum(1.5 * ways, 0.25), 1.0, 0.8, own)
         self.is_free = self.high > self.low
         self.fixed = [*least.tolist(), *np.exp(self.low[len(ways) : -1]).tolist(), base.fluid.viscosity]
-        self.start = np.where(self.is_free, (first - self.low) / np.where(self.is_free, self.high - self.low, 1.0), 0)
-        self.start = np.clip(self.start, 0, 1)
+        # Wide ones reach farther than they go; those of the recipe's own handles may have been better for the picture.
+        radii = [np.maximum(1.5 * ways, 0.25), *([np.array([lead.handle.radius for lead in leads])] if aim.own else ())]
+        span = np.where(self.is_free, self.high - self.low, 1.0)
+        starts = [np.where(self.is_free, (listed(each, 1.0, 0.8, own) - self.low) / span, 0) for each in radii]
+        self.starts = [np.clip(start, 0, 1) for start in starts]
 
     def run(self, stage: _Stage, origin: np.ndarray, groups: np.ndarray, reach: float, budget: int) -> None:
         """Search from `origin` along `groups`: with `budget` replays, at first `reach` of the cube apart."""

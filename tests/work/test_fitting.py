@@ -248,6 +248,22 @@ def test_a_pin_that_was_set_late_is_led_to_where_it_was_set(device: Device):
     assert recipe.handle[1].to == pytest.approx((x, y), abs=1e-4)
 
 
+def test_what_handles_do_well_by_themselves_is_where_a_fit_begins(device: Device):
+    """Nine small ones that arrive: wide ones in their places arrive too, and move the picture between them."""
+    places = [(x, y) for x in (0.2, 0.5, 0.8) for y in (0.2, 0.5, 0.8)]
+    handles = "".join(
+        f"[[handle]]\nat = [{x}, {y}]\nto = [{x + 0.02 * (-1) ** number}, {y}]\nradius = 0.1\nduration = 0.5\n"
+        for number, (x, y) in enumerate(places)
+    )
+    recipe = FREE.replace("grid = 32", "grid = 64").replace("duration = 0.8", "duration = 1.6") + handles
+    ends = np.array(places)
+    _, alone, _ = arrived(device, Recipe.parse(recipe), ends)
+    found = fit(device, None, 1, recipe)
+    _, shown, folds = arrived(device, found.trial.recipe, ends)
+    assert (found.is_met, folds) == (True, 0)
+    assert np.abs(shown).mean() < 1.1 * np.abs(alone).mean()
+
+
 def test_a_far_way_has_a_radius_as_large_as_it_needs(device: Device):
     """Half of the way and more, where that leaves nothing to search; of what is turned about a point too."""
     far = fit(device, np.array([[[0.0, 0.5], [1.0, 0.5]]]), 1, FREE.replace("grid = 32", "grid = 8")).trial.recipe
