@@ -71,6 +71,10 @@ def writable(path: str | os.PathLike[str]) -> Path:
             raise UserError(f"Cannot write {path}: it is not an ordinary file; give another name.")
         if not target.parent.is_dir():
             raise UserError(f"Cannot write {path}: there is no folder {target.parent}; make it first.")
+        if target.exists() and not os.access(target, os.W_OK):  # it would be replaced all the same
+            raise UserError(
+                f"Cannot write {path}: that file is read-only; change its permissions or give another name."
+            )
     except OSError as error:  # a name that is too long, a folder that cannot be looked into
         raise cannot_write(path, error) from None
     if not os.access(target.parent, os.W_OK | os.X_OK):

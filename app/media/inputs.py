@@ -36,6 +36,8 @@ def open_input(path: str | os.PathLike[str], kind: str = "file", most: int | Non
         raise UserError(f"Cannot read {path}: there is no such file; check the name.") from None
     except ValueError:
         raise UserError(f"Cannot read {path}: no file has a NUL in its name; check the name.") from None
+    except PermissionError:
+        raise UserError(f"Cannot read {path}: no permission to read it; change its permissions.") from None
     except OSError as error:
         raise UserError(f"Cannot read {path}: {error.strerror or error}.") from None
 

@@ -809,6 +809,29 @@ def test_names_that_cannot_be_written(tmp_path: Path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["device.png", "folder.png"]
 
 
+@pytest.mark.parametrize("name", ["x.png", "work.fluidwarp"])
+def test_a_file_that_is_read_only_is_not_replaced(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A rename over it asks for no permission but the folder's; of root nothing is kept, so that is played here."""
+    (tmp_path / name).write_bytes(b"before")
+    (tmp_path / name).chmod(0o444)
+    monkeypatch.setattr("os.access", lambda path, mode: not (mode & os.W_OK) or os.stat(path).st_mode & 0o200 > 0)
+    said = "that file is read-only; change its permissions or give another name"
+    with pytest.raises(UserError, match=said), files.replacing(tmp_path / name):
+        pytest.fail("it was begun")
+    assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [(name, b"before")]
+
+
+def test_a_file_without_permission_to_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "a.png").write_bytes(b"")
+
+    def refused(*_: object) -> int:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("app.media.inputs._without_waiting", refused)
+    with pytest.raises(UserError, match=r"Cannot read .*a.png: no permission to read it; change its permissions\.$"):
+        read_picture(tmp_path / "a.png")
+
+
 def test_a_folder_without_permission(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(os, "access", lambda path, mode: False)  # root may write anywhere
     with pytest.raises(UserError, match="no permission; choose another folder"):
