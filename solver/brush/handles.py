@@ -218,7 +218,7 @@ class Handles:
         pushes = Pushes(self._fluid.grid, places[drawn], reaches)
         push, carried = pushes.influence(places), np.zeros((len(pushed), 2))
         slower = _of_each(
-            np.minimum, self._slower(strain_read(), self._local[listed]), rows
+            np.minimum, self._slower(strain_read(), listed), rows
         )  # a whole goes as slowly as its slowest
         slower = np.repeat(slower * self._progressing(active, targets, time, dt), counts)
         wanted, growths = self._wanted(active, slower, targets, dt)
@@ -330,7 +330,9 @@ class Handles:
         if not self._shapes:
             return found
         expected = self._expected.field
-        slower = self._slower(self._strain.around(self._located_or_waiting(), self._radii, expected), self._local)
+        slower = self._slower(
+            self._strain.around(self._located_or_waiting(), self._radii, expected), np.arange(len(self._at))
+        )
         near, time, lefts = 1 / max(self._warp.size), self._fluid.time, self.left(math.inf, 1.0)
         for shape, rows, (_, waited), (_, left) in zip(self._shapes, self._rows, self._progress, lefts, strict=True):
             starts = self._starts[rows]
@@ -525,17 +527,25 @@ class Handles:
     def slower(self, numbers: np.ndarray) -> np.ndarray:
         """The part of its speed, 0-1, that the map around each of these points still allows."""
         places, radii = self._places[numbers], self._radii[numbers]
-        return self._slower(self._strain.around(places, radii, self._expected.field), self._local[numbers])
+        return self._slower(self._strain.around(places, radii, self._expected.field), numbers)
 
-    def _slower(self, strain: np.ndarray, local: np.ndarray) -> np.ndarray:
+    def _slower(self, strain: np.ndarray, numbers: np.ndarray) -> np.ndarray:
         least, most, area_left, kept = strain.T
-        grown = self._grown()
+        grown, local = self._grown(), self._locality(numbers)
         kept, left = kept * grown, np.minimum(least, area_left) * grown
         slowing = SLOWING + local * (SLOWING_LOCAL - SLOWING)
         stopped = STOPPED + local * (STOPPED_LOCAL - STOPPED)
         resolved = _smoothstep((kept - stopped) / (slowing - stopped))
         pressed = _smoothstep((left - STOPPED_LOCAL) / (SLOWING_LOCAL - STOPPED_LOCAL))
         return resolved * pressed * _smoothstep((TORN - most) / (TORN - STRETCHING))
+
+    def _locality(self, numbers: np.ndarray) -> np.ndarray:
+        """The least local part of each of these points and of what has begun beside it: all of them drive the fluid."""
+        begun = np.flatnonzero(~np.isnan(self._starts[:, 0]))
+        here, there = self._places[numbers].T, self._places[begun].T
+        far = np.hypot(here[0][:, None] - there[0], here[1][:, None] - there[1])
+        meet = far < self._radii[numbers, None] + self._radii[begun]
+        return np.minimum(self._local[numbers], np.where(meet, self._local[begun], 1.0).min(axis=1, initial=1.0))
 
     def _grown(self) -> float:
         """How many times as large as in the original the area is that has grown most within a closed line."""
