@@ -419,7 +419,9 @@ def _starts(
         while replay.tick < end:
             progress.enter(f"looking where the handles were set, {100 * replay.tick // end} %")
             replay.advance()
-        saved = replay.handles.save().values
+        moment = replay.handles.save()
+        saved = moment.values
+        moment.release()
     finally:
         replay.release()
     labels = [label for label, _ in labelled(recipe.handle, ())]

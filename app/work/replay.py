@@ -297,6 +297,7 @@ class Replay:
             for field, amount in motions:
                 self.fluid.add_local(field, amount)
         with self.device.stage("warp map"):
+            self.handles.follow(self.fluid, dt * part)
             self.warp.follow(self.fluid, dt * part)
         if self.density is not None:
             self.density.advance(self.fluid.carrier(), self.grid, dt * part)
@@ -309,6 +310,7 @@ class Replay:
             self.fluid.clear_velocity()
         if change.reset_warp:
             self.warp.reset()
+            self.handles.forget_map()
             if self.density is not None:
                 self.density.set(self._density_values())
         if change.clear_masks:

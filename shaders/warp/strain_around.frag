@@ -1,9 +1,14 @@
 // Strain around: of what strain.frag has drawn on a lattice, in a row (x) of the box about each (y) of some places: the least
 // det J; the square of the largest stretch, how many times farther apart in the original a place and the one to its left, or
-// the one above it, lie; and the least area between texels.
+// the one above it, lie; the least area between texels; and the least part of both that is left of what is expected, 1 or,
+// with EXPECTED, e^u_expected over the picture.
 // u_strain; u_boxes: left, top, right, bottom, places of the lattice; u_step: how far apart these are, longer sides; u_last:
 // where none lies beyond, as in strain.frag.
-// reads: 2, and 2 for each place of a row
+// reads: 2, and 2 for each place of a row, 6 with EXPECTED
+#ifdef EXPECTED
+#include "lib/displacement.glsl"
+uniform sampler2D u_expected;
+#endif
 uniform sampler2D u_strain;
 uniform sampler2D u_boxes;
 uniform vec2 u_step;
@@ -22,15 +27,20 @@ float stretch(vec2 place, vec2 back, vec2 moved) {
 void main() {
     vec4 box = texelFetch(u_boxes, ivec2(0, int(gl_FragCoord.y)), 0);
     float row = box.y + floor(gl_FragCoord.x);
-    vec3 found = vec3(1e30, 0.0, 1e30);
+    vec4 found = vec4(1e30, 0.0, 1e30, 1e30);
     vec4 left = at(box.x - 1.0, row);
     if (row < box.w)
         for (float column = box.x; column < box.z; ++column) {
             vec4 here = at(column, row), above = at(column, row - 1.0);
             vec2 place = vec2(column, row);
             float most = max(stretch(place, vec2(1.0, 0.0), here.xy - left.xy), stretch(place, vec2(0.0, 1.0), here.xy - above.xy));
-            found = vec3(min(found.x, here.z), max(found.y, most), min(found.z, here.w));
+            float left_over = min(here.z, here.w);
+#ifdef EXPECTED
+            vec2 p = (place + 0.5) / vec2(textureSize(u_strain, 0)) * vec2(textureSize(u_expected, 0));
+            left_over /= exp(linear_texels(u_expected, p).r);
+#endif
+            found = vec4(min(found.x, here.z), max(found.y, most), min(found.z, here.w), min(found.w, left_over));
             left = here;
         }
-    out_strain = vec4(found, 0.0);
+    out_strain = found;
 }

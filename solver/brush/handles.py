@@ -15,6 +15,7 @@ import numpy as np
 from solver.brush.balance import Balance, solved
 from solver.brush.brush import Brush
 from solver.brush.distance import Distance
+from solver.brush.expected import EXPECTED, Expected, HandleState
 from solver.brush.handle import Handle, Shape, area, spun, swelling
 from solver.brush.listed import draw_listed
 from solver.brush.pushes import Pushes
@@ -39,9 +40,9 @@ RIDGE, RIDGE_OF_LINES = 1e-3, 1e-4
 # Where handles lie beside one another each has a push so many times as wide, too, which counts so much in the squares:
 # what they have in common is cheaper by it, and would else flow back between them.
 WIDE, WIDE_SHARE = 3.0, 0.2
-# Of the map around a handle (`Strain`): det J and areas between texels, which a flow keeps at 1 as long as the map
-# resolves it, and what is local does not; and the stretch. From the first of each on it goes slower, at the second it
-# stops: before anything folds.
+# Of the map around a handle (`Strain`): det J and areas between texels as a part of what is expected (`Expected`): it
+# stays 1 as long as the map resolves the flow; the same as they are, which what is local makes less; and the stretch.
+# From the first of each on it goes slower, at the second it stops: before anything folds.
 SLOWING, STOPPED = 0.92, 0.8
 SLOWING_LOCAL, STOPPED_LOCAL = 0.4, 0.22
 STRETCHING, TORN = 8.0, 12.0
@@ -140,6 +141,7 @@ class Handles:
         self._stream = fluid.device.field((fluid.grid.nx + 1, fluid.grid.ny + 1), 1, "stream function of handles")
         self._at_rest = fluid.device.field((1, 1), 4, "no motion")
         self._brush, self._strain, self._distance = Brush(fluid.device), Strain(warp), Distance(fluid.device)
+        self._expected = Expected(warp)
         # Where the points of those that have begun are, and were then; NaN for the others.
         self._places = self._starts = np.zeros((0, 2))
         self._progress = np.zeros((0, 2))  # of each the least way it has had left, and for how long that is not halved
@@ -180,6 +182,7 @@ class Handles:
         self.lead(dt, self._fluid.time)
         self._fluid.step(dt, forces, self.make_up)
         self.carry()
+        self.follow(self._fluid, dt)
         self._warp.follow(self._fluid, dt)  # pyright: ignore[reportArgumentType]
 
     def lead(self, dt: float, time: float) -> None:
@@ -198,7 +201,7 @@ class Handles:
             return
         radii, counts = self._radii[listed], self._counts[in_force]
         # A software rasteriser draws the strain while the processor finds the pushes: it is read after them.
-        strain_read = self._strain.look(self._places[listed], radii)
+        strain_read = self._strain.look(self._places[listed], radii, self._expected.field)
         targets = self._targets(active, listed, time, dt)
         rows, places = targets.rows, targets.here
         rings, loops, swelling_tips, pushed = self._areas(active, targets)
@@ -272,8 +275,17 @@ class Handles:
             return
         solids: dict[str, Any] = {"apart": self._distance.of(fluid)} if fluid.has_solids else {}
         carry = fluid.device.pass_("brush/handle_carry.frag", **({"SOLIDS": 1} if solids else {}))
+        self._expected.begin()
         listed = lead.places[lead.pushed], lead.radii[lead.pushed], lead.local
         fluid.local.add(lambda field: draw_listed(fluid.device, carry, field, fluid.grid, *listed, **solids))
+
+    def follow(self, fluid: Scheme, dt: float) -> None:
+        """Before the map follows a fluid for `dt`, whether handles lead or not: expect what that does to areas."""
+        self._expected.follow(fluid, dt)
+
+    def forget_map(self) -> None:
+        """Expect nothing of a map that has been reset."""
+        self._expected.clear()
 
     # -- what it looks at -------------------------------------------------------------------------------------------
 
@@ -317,7 +329,10 @@ class Handles:
         found = list[str | None]()
         if not self._shapes:
             return found
-        slower = self._slower(self._strain.around(self._located_or_waiting(), self._radii), np.arange(len(self._at)))
+        expected = self._expected.field
+        slower = self._slower(
+            self._strain.around(self._located_or_waiting(), self._radii, expected), np.arange(len(self._at))
+        )
         near, time, lefts = 1 / max(self._warp.size), self._fluid.time, self.left(math.inf, 1.0)
         for shape, rows, (_, waited), (_, left) in zip(self._shapes, self._rows, self._progress, lefts, strict=True):
             starts = self._starts[rows]
@@ -354,9 +369,10 @@ class Handles:
     # -- its state --------------------------------------------------------------------------------------------------
 
     def save(self) -> State:
-        """A copy of this moment."""
+        """A copy of this moment, which the caller releases."""
         kept = {"places": self._places, "starts": self._starts, "counts": self._counts, "progress": self._progress}
-        return State({}, {name: values.copy() for name, values in kept.items()})
+        expected = self._expected.field
+        return HandleState.of(self._warp.device, {} if expected is None else {EXPECTED: expected}, **kept)
 
     def restore(self, state: State) -> None:
         """Go back to a moment, perhaps with other handles than then among those that had not begun.
@@ -377,11 +393,20 @@ class Handles:
         if progress is None or progress.dtype != np.float64 or progress.shape != (len(counts), 2):
             raise ValueError("the state of handles is missing")
         self._progress = self._fitted_progress(progress)
+        self._expected.restore(state.fields.get(EXPECTED))
         self._lead = None
 
     def release(self) -> None:
         """Free the textures."""
-        for thing in (self._stream, self._at_rest, self._forward, self._brush, self._strain, self._distance):
+        for thing in (
+            self._stream,
+            self._at_rest,
+            self._forward,
+            self._brush,
+            self._strain,
+            self._distance,
+            self._expected,
+        ):
             thing.release()
 
     # -- where they are ---------------------------------------------------------------------------------------------
@@ -501,23 +526,26 @@ class Handles:
 
     def slower(self, numbers: np.ndarray) -> np.ndarray:
         """The part of its speed, 0-1, that the map around each of these points still allows."""
-        return self._slower(self._strain.around(self._places[numbers], self._radii[numbers]), numbers)
+        places, radii = self._places[numbers], self._radii[numbers]
+        return self._slower(self._strain.around(places, radii, self._expected.field), numbers)
 
     def _slower(self, strain: np.ndarray, numbers: np.ndarray) -> np.ndarray:
-        least, most, area_left = strain.T
+        least, most, area_left, kept = strain.T
         grown, local = self._grown(), self._locality(numbers)
-        least = np.minimum(least, area_left) * grown
+        kept, left = kept * grown, np.minimum(least, area_left) * grown
         slowing = SLOWING + local * (SLOWING_LOCAL - SLOWING)
         stopped = STOPPED + local * (STOPPED_LOCAL - STOPPED)
-        return _smoothstep((least - stopped) / (slowing - stopped)) * _smoothstep((TORN - most) / (TORN - STRETCHING))
+        resolved = _smoothstep((kept - stopped) / (slowing - stopped))
+        pressed = _smoothstep((left - STOPPED_LOCAL) / (SLOWING_LOCAL - STOPPED_LOCAL))
+        return resolved * pressed * _smoothstep((TORN - most) / (TORN - STRETCHING))
 
     def _locality(self, numbers: np.ndarray) -> np.ndarray:
-        """The local part of each of these points, or of what has begun beside it: it changes det J there too."""
+        """The least local part of each of these points and of what has begun beside it: all of them drive the fluid."""
         begun = np.flatnonzero(~np.isnan(self._starts[:, 0]))
         here, there = self._places[numbers].T, self._places[begun].T
         far = np.hypot(here[0][:, None] - there[0], here[1][:, None] - there[1])
         meet = far < self._radii[numbers, None] + self._radii[begun]
-        return np.where(meet, self._local[begun], 0.0).max(axis=1, initial=0.0)
+        return np.minimum(self._local[numbers], np.where(meet, self._local[begun], 1.0).min(axis=1, initial=1.0))
 
     def _grown(self) -> float:
         """How many times as large as in the original the area is that has grown most within a closed line."""

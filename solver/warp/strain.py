@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
-from solver.gl.field import FieldPool
+from solver.gl.field import Field, FieldPool
 from solver.warp.map import WarpMap
 
 PLACES = 256  # along the longer side of the picture where it is looked at: two a cell up to so many, or one a cell
@@ -21,25 +22,27 @@ class Strain:
         self._warp = warp
         self._fields = FieldPool(warp.device, "strain")
 
-    def around(self, places: np.ndarray, radii: np.ndarray) -> np.ndarray:
-        """The least det J, largest stretch and least area between texels within a radius of each place (n, 2).
+    def around(self, places: np.ndarray, radii: np.ndarray, expected: Field | None = None) -> np.ndarray:
+        """The least det J, largest stretch and least area between texels within a radius of each place (n, 2); and the
+        least part of det J and of that area that is left of what is expected of both.
 
         The stretch is how many times farther apart in the original two neighbours of the lattice lie; the area,
         what becomes of that between four neighbouring texels, as a remap keeps what is at its texels only.
+        `expected`: the logarithm of det J over the picture; by default it is 0.
 
         Returns:
-            float64 (n, 3).
+            float64 (n, 4).
         """
-        return self.look(places, radii)()
+        return self.look(places, radii, expected)()
 
-    def look(self, places: np.ndarray, radii: np.ndarray) -> Callable[[], np.ndarray]:
+    def look(self, places: np.ndarray, radii: np.ndarray, expected: Field | None = None) -> Callable[[], np.ndarray]:
         """The same, by what is returned, called before the next look: until then nothing waits for the GPU."""
-        on_lattice, on_rings = self._on_lattice(places, radii), self._on_rings(places, radii)
+        on_lattice, on_rings = self._on_lattice(places, radii, expected), self._on_rings(places, radii, expected)
 
         def around() -> np.ndarray:
             found = np.stack([on_lattice(), on_rings()])
-            least, most, area = found[..., 0].min(axis=0), found[..., 1].max(axis=0), found[..., 2].min(axis=0)
-            return np.stack([least, most, area], axis=-1)
+            least, most = found.min(axis=0), found.max(axis=0)
+            return np.stack([least[:, 0], most[:, 1], least[:, 2], least[:, 3]], axis=-1)
 
         return around
 
@@ -47,7 +50,7 @@ class Strain:
         """Free the textures."""
         self._fields.release()
 
-    def _on_lattice(self, places: np.ndarray, radii: np.ndarray) -> Callable[[], np.ndarray]:
+    def _on_lattice(self, places: np.ndarray, radii: np.ndarray, expected: Field | None) -> Callable[[], np.ndarray]:
         warp, extent = self._warp, np.array(self._warp.extent)
         cells = np.array(warp.coarse_size)
         count = np.maximum(cells, np.minimum(2 * cells, PLACES * extent / extent.max())).astype(int)
@@ -63,17 +66,16 @@ class Strain:
             found = self._fields.get("around", (int(count[1]), len(places)), 4)
             region = 0, 0, int((high - low)[:, 1].max()), len(places)
             step, last = tuple(extent / count), tuple(extent - extent / warp.size)
-            warp.device.pass_("warp/strain_around.frag")(
-                found, region=region, strain=lattice, boxes=boxes, step=step, last=last
-            )
+            worst = warp.device.pass_("warp/strain_around.frag", **({} if expected is None else {"EXPECTED": 1}))
+            given: dict[str, Any] = {} if expected is None else {"expected": expected}
+            worst(found, region=region, strain=lattice, boxes=boxes, step=step, last=last, **given)
             rows = found.get(region).astype(np.float64)
-            return np.stack(
-                [rows[..., 0].min(axis=1), np.sqrt(rows[..., 1].max(axis=1)), rows[..., 2].min(axis=1)], axis=-1
-            )
+            least, most = rows.min(axis=1), np.sqrt(rows[..., 1].max(axis=1))
+            return np.stack([least[:, 0], most, least[:, 2], least[:, 3]], axis=-1)
 
         return around
 
-    def _on_rings(self, places: np.ndarray, radii: np.ndarray) -> Callable[[], np.ndarray]:
+    def _on_rings(self, places: np.ndarray, radii: np.ndarray, expected: Field | None) -> Callable[[], np.ndarray]:
         warp, angles = self._warp, 2 * np.pi * np.arange(AROUND + 1) / AROUND
         rings = np.array(RINGS)[:, None, None] * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
         last = np.subtract(warp.extent, np.divide(warp.extent, warp.size))
@@ -87,6 +89,20 @@ class Strain:
                 apart, far = (np.hypot(*np.moveaxis(np.diff(each, axis=axis), -1, 0)) for each in (original, close))
                 ratio = np.where(far > 1e-6, apart / np.maximum(far, 1e-6), 0.0)
                 most = np.maximum(most, ratio.max(axis=(1, 2)))
-            return np.stack([found[..., 2].min(axis=(1, 2)), most, found[..., 3].min(axis=(1, 2))], axis=-1)
+            bent = found[..., 2:].min(axis=-1)
+            if expected is not None:
+                bent /= np.exp(_between_texels(expected.get(), close / warp.extent))
+            return np.stack([*found[..., 2:].min(axis=(1, 2)).T, most, bent.min(axis=(1, 2))], axis=-1)[:, [0, 2, 1, 3]]
 
         return around
+
+
+def _between_texels(values: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Values (h, w) at places (..., 2), 0-1 of either side, bilinear; beyond the outermost texels those."""
+    last = np.array(values.shape[::-1]) - 1
+    at = np.clip(places * (last + 1) - 0.5, 0.0, last)
+    first = np.minimum(at.astype(int), np.maximum(last - 1, 0))
+    (x, y), (fx, fy) = np.moveaxis(first, -1, 0), np.moveaxis(at - first, -1, 0)
+    right, below = np.minimum(x + 1, last[0]), np.minimum(y + 1, last[1])
+    upper, lower = ((1 - fx) * values[row, x] + fx * values[row, right] for row in (y, below))
+    return (1 - fy) * upper + fy * lower

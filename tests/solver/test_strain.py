@@ -44,7 +44,7 @@ def test_what_is_around_places_is_the_worst_within_their_boxes(steps: int, devic
     determinants = warp.determinants(lattice.reshape(-1, 2)).reshape(areas.shape)
     across = np.hypot(*np.moveaxis(np.diff(here, axis=1), -1, 0)) / np.diff(x)
     down = np.hypot(*np.moveaxis(np.diff(here, axis=0), -1, 0)) / np.diff(y)[:, None]
-    for (least, most, area), place, radius in zip(found, places, radii, strict=True):
+    for (least, most, area, kept), place, radius in zip(found, places, radii, strict=True):
         left, top = np.maximum(np.floor((place - radius) / extent * count), 0).astype(int)
         far, low = np.minimum(np.ceil((place + radius) / extent * count), count).astype(int)
         box = np.s_[top:low, left:far]
@@ -54,6 +54,7 @@ def test_what_is_around_places_is_the_worst_within_their_boxes(steps: int, devic
         )
         assert most == pytest.approx(stretch, rel=5e-3)
         assert area == pytest.approx(areas[box].min(), abs=2e-3)
+        assert kept == min(least, area)
     assert found[0, 2] > 0.99  # where it is only turned, though a triangle of texels shrinks to .83
     assert found[0, 1] > 1.2 * found[2, 1]  # they are not all the same
 
@@ -65,7 +66,7 @@ def test_a_fold_between_two_texels_is_told(device: Device):
     displacement[:, 16, 0] = 1.5 / 32  # its column lies beyond the next
     warp.set(displacement)
     strain = Strain(warp)
-    (_, _, crossed), (_, _, plain) = strain.around(np.array([[0.5, 0.5], [0.1, 0.5]]), np.array([0.1, 0.1]))
+    (_, _, crossed, _), (_, _, plain, _) = strain.around(np.array([[0.5, 0.5], [0.1, 0.5]]), np.array([0.1, 0.1]))
     strain.release()
     assert crossed < 0
     assert plain == pytest.approx(1, abs=1e-3)

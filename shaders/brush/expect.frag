@@ -1,0 +1,31 @@
+// Expect: what det J would be if the map lost nothing, as a logarithm: E'(x) = E(x_d) - dt div b V halfway, where the fluid
+// keeps areas and only what is local, b V, changes them. Outside the fluid's window nothing changes.
+// u_expected (E): over the whole picture; u_velocity: what carries the picture, MAC faces, lengths / s; u_cells_a_speed: dt /
+// spacing; u_corner, u_scale: where the window begins in texels of E, and cells for each of them.
+// Define LOCAL for u_local (b V): MAC faces, lengths / s.
+// reads: 47, and 32 more with LOCAL
+#include "lib/mac.glsl"
+#include "lib/displacement.glsl"
+uniform sampler2D u_expected;
+uniform sampler2D u_velocity;
+uniform vec2 u_cells_a_speed;
+uniform vec2 u_corner;
+uniform vec2 u_scale;
+#ifdef LOCAL
+uniform sampler2D u_local;
+#endif
+layout(location = 0) out float out_expected;
+
+void main() {
+    vec2 place = gl_FragCoord.xy, p = (place - u_corner) * u_scale, edge = vec2(textureSize(u_velocity, 0)), back = vec2(0.0);
+    float grown = 0.0;
+    if (all(greaterThan(p, vec2(0.0))) && all(lessThan(p, edge))) {
+        back = mac_backtrace(u_velocity, p, mac_velocity(u_velocity, p), u_cells_a_speed);
+#ifdef LOCAL
+        vec2 halfway = clamp(p + 0.5 * back, vec2(0.5), edge - 0.5), across = vec2(0.5, 0.0), down = vec2(0.0, 0.5);
+        grown = u_cells_a_speed.x * (mac_velocity(u_local, halfway + across).x - mac_velocity(u_local, halfway - across).x)
+              + u_cells_a_speed.y * (mac_velocity(u_local, halfway + down).y - mac_velocity(u_local, halfway - down).y);
+#endif
+    }
+    out_expected = cubic_texels(u_expected, place + back / u_scale, 0.0).r - grown;
+}

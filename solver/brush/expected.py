@@ -1,0 +1,99 @@
+"""What det J of a map would be if it lost nothing: what is local presses the picture together and draws it out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from solver.gl.device import Device
+from solver.gl.field import DoubleField, Field
+from solver.scheme import Scheme
+from solver.state import State
+from solver.warp.map import WarpMap
+
+LEAST = 1e-3  # that det J counts as at first
+EXPECTED = "expected"  # the name of the logarithms in a saved state
+
+
+@dataclass(frozen=True)
+class HandleState(State):
+    """A copy of what handles know, with what is expected of the map if something is."""
+
+    def with_arrays(self, device: Device, arrays: Mapping[str, np.ndarray]) -> HandleState:
+        """One that holds what `arrays()` of any gave; ValueError if that is of something else."""
+        rest, fields = dict(arrays), dict[str, Field]()
+        given = rest.pop(EXPECTED, None)
+        if given is not None:
+            if given.ndim != 2 or min(given.shape) < 4 or given.dtype != np.float32 or not np.isfinite(given).all():
+                raise ValueError(f"its {EXPECTED} is of another kind")
+            fields[EXPECTED] = device.upload(given, f"{EXPECTED}, given")
+        return HandleState(fields, rest)
+
+
+class Expected:
+    """ln det J over the whole picture, carried along with it, where only what is local changes it.
+
+    The fluid keeps areas. So what det J has besides this, the map has not resolved. It begins with the map as it is
+    when the first local motion of a handle carries it.
+
+    Args:
+        warp: the map.
+    """
+
+    def __init__(self, warp: WarpMap) -> None:
+        self._warp = warp
+        self._values: DoubleField | None = None
+
+    @property
+    def field(self) -> Field | None:
+        """The logarithms, R32F; None as long as nothing local has been led."""
+        return None if self._values is None else self._values.read
+
+    def begin(self) -> None:
+        """Expect the map as it is, if nothing has been expected before; waits for the GPU then."""
+        if self._values is None:
+            size = self._warp.coarse_size
+            now = self._warp.device.field(size, 4, "strain, to begin with")
+            self._warp.draw_strain(now, (0, 0, *size))
+            self._values = self._begun(size)
+            self._values.read.set(np.log(np.maximum(now.get()[..., 2:].min(axis=-1), LEAST)))
+            now.release()
+
+    def follow(self, fluid: Scheme, dt: float) -> None:
+        """Carry it `dt` seconds by what carries the picture, before that is drawn anew."""
+        if self._values is None:
+            return
+        grid, (width, height) = fluid.grid, self._values.read.size
+        texel = np.array(grid.picture) / (width, height)
+        inputs: dict[str, Any] = {"velocity": fluid.carrier(), **fluid.params.walls.inputs}
+        inputs |= {"corner": tuple(grid.origin / texel), "scale": tuple(texel / grid.spacing)}
+        defines = dict(fluid.params.walls.defines)
+        if not fluid.local.is_empty:
+            inputs, defines = inputs | {"local": fluid.local.field}, defines | {"LOCAL": 1}
+        expect = fluid.device.pass_("brush/expect.frag", **defines)
+        hx, hy = grid.spacing
+        expect(self._values.write, expected=self._values.read, cells_a_speed=(dt / hx, dt / hy), **inputs)
+        self._values.swap()
+
+    def clear(self) -> None:
+        """Expect nothing."""
+        self.release()
+        self._values = None
+
+    def restore(self, saved: Field | None) -> None:
+        """Be a copy of what `field` was."""
+        self.clear()
+        if saved is not None:
+            self._values = self._begun(saved.size)
+            self._values.read.copy_from(saved)
+
+    def release(self) -> None:
+        """Free the textures."""
+        if self._values is not None:
+            self._values.release()
+
+    def _begun(self, size: tuple[int, int]) -> DoubleField:
+        return self._warp.device.double_field(size, 1, "expected det J, logarithm")
