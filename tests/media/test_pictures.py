@@ -827,7 +827,7 @@ def test_a_file_without_permission_to_read(tmp_path: Path, monkeypatch: pytest.M
     def refused(*_: object) -> int:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("app.media.inputs._without_waiting", refused)
+    monkeypatch.setattr(os, "open", refused)
     with pytest.raises(UserError, match=r"Cannot read .*a.png: no permission to read it; change its permissions\.$"):
         read_picture(tmp_path / "a.png")
 
