@@ -94,7 +94,14 @@ def _usage(error: Any) -> str:
     """What is wrong with the words of a command line, and where they are explained."""
     said, context = error.format_message().rstrip("."), getattr(error, "ctx", None)
     command = "" if context is None or context.parent is None else f" {context.info_name}"
+    if context is None and sys.argv[1] in _names():  # click names none where an option lacks its argument
+        command = f" {sys.argv[1]}"
     return f"{said[:1].lower()}{said[1:]}; `fluidwarp{command} --help` explains what is wanted"
+
+
+def _names() -> set[str]:
+    """The commands as they are typed."""
+    return {command.name or command.callback.__name__ for command in cli.registered_commands if command.callback}
 
 
 def _print_version() -> None:

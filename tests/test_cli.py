@@ -306,7 +306,7 @@ def test_wrong_words_of_a_command_are_told_in_one_line(
     assert "\x1b" not in told.err
 
 
-@pytest.mark.parametrize("words", [["render"], ["render", "-o"], ["--bogus"], ["fit", "x.toml"]])
+@pytest.mark.parametrize("words", [["render"], ["render", "-o"], ["fit", "--gpu"], ["--bogus"], ["fit", "x.toml"]])
 def test_missing_words_are_told_in_one_line(
     words: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -315,7 +315,8 @@ def test_missing_words_are_told_in_one_line(
         cli.main()
     told = capsys.readouterr()
     assert (ended.value.code, told.out, told.err.count("\n")) == (2, "", 1)
-    assert "--help` explains what is wanted" in told.err
+    command = f" {words[0]}" if words[0] in ("render", "fit") else ""
+    assert told.err.endswith(f"`fluidwarp{command} --help` explains what is wanted\n")
 
 
 # -- what does not ----------------------------------------------------------------------------------------------------
