@@ -212,4 +212,4 @@ def test_a_file_that_is_not_there_and_a_command_that_is_none_are_told_in_a_sente
     (tmp_path / "doctor").write_text("no picture")
     ran = fluidwarp(tmp_path, "doctor", "--nonesuch")
     assert ran.returncode == 2
-    assert "No such option" in ran.stderr
+    assert "no such option" in ran.stderr
