@@ -257,7 +257,7 @@ class Handles:
         lead = self._lead = Lead(
             places, radii, pushed, pushes, looked_at, drawn, rings, loops, balance, wanted, carried
         )
-        self._fluid.impulse.add(lambda faces: self._give(lead, faces))
+        self._fluid.impulse.add(lambda faces: self._push(lead, faces, lead.wanted))
 
     def make_up(self, velocity: Field) -> None:
         """After viscosity, before the projection: add to a velocity on MAC faces what is still lacking.
@@ -265,8 +265,9 @@ class Handles:
         For `steer` of `Scheme.step`. Of each push less, in all its places alike, the more of it lies on what is thicker
         than at its middle, or solid.
         """
-        if self._lead is not None:
-            self._give(self._lead, velocity, is_sparing=True)
+        if (lead := self._lead) is not None and len(lead.places):
+            found = self._probed(lead.looked_at, velocity)
+            self._push(lead, velocity, lead.wanted - found[: len(lead.places), :2], found[:, 2])
 
     def carry(self) -> None:
         """After a step: let what is local carry the picture until the fluid's next one."""
@@ -595,27 +596,24 @@ class Handles:
         twirl, vectors = self._fluid.device.pass_("brush/twirl.frag"), [(speed / ring.length, 0.0)]
         ring.tip.draw(twirl, faces, self._fluid.grid, vectors, add=True, motion=self._at_rest, gain=1.0)
 
-    def _give(self, lead: Lead, faces: Field, is_sparing: bool = False) -> None:
-        """Add to a velocity on MAC faces what the active handles lack of the wanted one."""
+    def _push(self, lead: Lead, faces: Field, missing: np.ndarray, parts: np.ndarray | None = None) -> None:
+        """Add to a velocity on MAC faces what handles miss there, (n, 2); `parts`: of each push, for all looked at."""
         if not len(lead.places):
             return
-        fluid, grid = self._fluid, self._fluid.grid
-        found = self._probed(lead.looked_at, faces)
-        missing = lead.wanted - found[: len(lead.places), :2]
+        grid, missing = self._fluid.grid, missing.copy()
         for loop in lead.loops:  # the fluid swells by itself: (H4)
             arms = lead.places[loop] - lead.places[loop].mean(axis=0)
             missing[loop] -= swelling(lead.places[loop], missing[loop]) / 2 * arms
         asked = np.concatenate([missing[lead.pushed].ravel(), _spins(missing, lead.rings)])
         of_each = np.concatenate([np.repeat(lead.drawn, 2), [ring.centre for ring in lead.rings]]).astype(int)
-        parts = found[of_each, 2] if is_sparing else 1.0
-        strengths, count = lead.balance.strengths(asked, parts), 2 * len(lead.drawn)
+        strengths, count = lead.balance.strengths(asked, 1.0 if parts is None else parts[of_each]), 2 * len(lead.drawn)
         forces, spins = strengths[:count].reshape(-1, 2), strengths[count:]
         for ring, spin in zip(lead.rings, spins.tolist(), strict=True):
             self._spin(ring, spin, faces)
         self._stream.clear()
-        stream = fluid.device.pass_("brush/handle_stream.frag")
-        lead.pushes.draw(fluid.device, stream, self._stream, forces)
-        fluid.device.pass_("brush/curl.frag")(faces, add=True, stream=self._stream, spacing=grid.spacing)
+        stream = self._fluid.device.pass_("brush/handle_stream.frag")
+        lead.pushes.draw(self._fluid.device, stream, self._stream, forces)
+        self._fluid.device.pass_("brush/curl.frag")(faces, add=True, stream=self._stream, spacing=grid.spacing)
 
 
 def _beside(places: np.ndarray, radii: np.ndarray, handles: np.ndarray, led: np.ndarray) -> np.ndarray:
