@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -156,6 +157,8 @@ class _Video:
     def write(self, frame: np.ndarray) -> None:
         if self.cancel():
             raise Cancelled
+        if not self.temporary.parent.is_dir():  # the encoder would write on into a file without a name
+            raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT))
         if self._process is None:
             self._kind = frame.shape, frame.dtype
             self._process = self._start(frame)

@@ -514,11 +514,14 @@ def test_a_full_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str)
 def test_a_folder_that_vanishes_meanwhile(tmp_path: Path, name: str, moved: bool) -> None:
     folder, elsewhere = tmp_path / "folder", tmp_path / "elsewhere"
     folder.mkdir()
+    taken = 0
 
     def frames() -> None:
+        nonlocal taken
         with animation_writer(folder / name) as write:
             for number in range(4):
                 write(np.full((32, 32, 3), 40 * number, np.uint8))
+                taken += 1
                 if number == 1:
                     folder.rename(elsewhere)
                     if not moved:
@@ -526,6 +529,7 @@ def test_a_folder_that_vanishes_meanwhile(tmp_path: Path, name: str, moved: bool
 
     with pytest.raises(UserError, match=rf"^Cannot write {folder}/a[.a-z0-9]*: .*folder.* make it (first|again)"):
         frames()
+    assert taken == 2  # it is told with the next one, not after hours at the end
     assert not folder.exists()
 
 
