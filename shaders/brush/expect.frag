@@ -1,9 +1,8 @@
-// Expect: what det J would be if the map lost nothing, as a logarithm: E'(x) = E(x_d) - dt div b V halfway, where the fluid
-// keeps areas and only what is local, b V, changes them. Outside the fluid's window nothing changes.
-// u_expected (E): over the whole picture; u_velocity: what carries the picture, MAC faces, lengths / s; u_cells_a_speed: dt /
-// spacing; u_corner, u_scale: where the window begins in texels of E, and cells for each of them.
-// Define LOCAL for u_local (b V): MAC faces, lengths / s.
-// reads: 47, and 32 more with LOCAL
+// Expect: what det J would be if the map lost nothing, as a logarithm: E'(x) = E(x_d) - dt div V halfway. The fluid keeps
+// areas, but for sources and what is local. Outside its window nothing changes.
+// u_expected (E): over the whole picture; u_velocity (V): what carries the picture, MAC faces, lengths / s; u_cells_a_speed:
+// dt / spacing; u_corner, u_scale: where the window begins in texels of E, and cells for each of them.
+// reads: 79
 #include "lib/mac.glsl"
 #include "lib/displacement.glsl"
 uniform sampler2D u_expected;
@@ -11,9 +10,6 @@ uniform sampler2D u_velocity;
 uniform vec2 u_cells_a_speed;
 uniform vec2 u_corner;
 uniform vec2 u_scale;
-#ifdef LOCAL
-uniform sampler2D u_local;
-#endif
 layout(location = 0) out float out_expected;
 
 void main() {
@@ -21,11 +17,9 @@ void main() {
     float grown = 0.0;
     if (all(greaterThan(p, vec2(0.0))) && all(lessThan(p, edge))) {
         back = mac_backtrace(u_velocity, p, mac_velocity(u_velocity, p), u_cells_a_speed);
-#ifdef LOCAL
         vec2 halfway = clamp(p + 0.5 * back, vec2(0.5), edge - 0.5), across = vec2(0.5, 0.0), down = vec2(0.0, 0.5);
-        grown = u_cells_a_speed.x * (mac_velocity(u_local, halfway + across).x - mac_velocity(u_local, halfway - across).x)
-              + u_cells_a_speed.y * (mac_velocity(u_local, halfway + down).y - mac_velocity(u_local, halfway - down).y);
-#endif
+        grown = u_cells_a_speed.x * (mac_velocity(u_velocity, halfway + across).x - mac_velocity(u_velocity, halfway - across).x)
+              + u_cells_a_speed.y * (mac_velocity(u_velocity, halfway + down).y - mac_velocity(u_velocity, halfway - down).y);
     }
     out_expected = cubic_texels(u_expected, place + back / u_scale, 0.0).r - grown;
 }

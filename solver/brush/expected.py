@@ -1,4 +1,4 @@
-"""What det J of a map would be if it lost nothing: what is local presses the picture together and draws it out."""
+"""What det J of a map would be if it lost nothing: sources and what is local change areas."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ class HandleState(State):
 
 
 class Expected:
-    """ln det J over the whole picture, carried along with it, where only what is local changes it.
+    """ln det J over the whole picture, carried along with it, where only what carries it with a divergence changes it.
 
-    The fluid keeps areas. So what det J has besides this, the map has not resolved. It begins with the map as it is
-    when the first local motion of a handle carries it.
+    The fluid keeps areas, but for sources and what is local. So what det J has besides this, the map has not resolved.
+    It begins with the map as it is when the first handle swells it or moves it locally.
 
     Args:
         warp: the map.
@@ -49,7 +49,7 @@ class Expected:
 
     @property
     def field(self) -> Field | None:
-        """The logarithms, R32F; None as long as nothing local has been led."""
+        """The logarithms, R32F; None as long as no handle has swelled or been local."""
         return None if self._values is None else self._values.read
 
     def begin(self) -> None:
@@ -70,10 +70,7 @@ class Expected:
         texel = np.array(grid.picture) / (width, height)
         inputs: dict[str, Any] = {"velocity": fluid.carrier(), **fluid.params.walls.inputs}
         inputs |= {"corner": tuple(grid.origin / texel), "scale": tuple(texel / grid.spacing)}
-        defines = dict(fluid.params.walls.defines)
-        if not fluid.local.is_empty:
-            inputs, defines = inputs | {"local": fluid.local.field}, defines | {"LOCAL": 1}
-        expect = fluid.device.pass_("brush/expect.frag", **defines)
+        expect = fluid.device.pass_("brush/expect.frag", **fluid.params.walls.defines)
         hx, hy = grid.spacing
         expect(self._values.write, expected=self._values.read, cells_a_speed=(dt / hx, dt / hy), **inputs)
         self._values.swap()

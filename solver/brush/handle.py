@@ -20,6 +20,7 @@ from solver.limits import (
     LEAST_STIFFNESS,
     LONGEST_LINE,
     MOST_SCALE,
+    MOST_STRETCH,
     MOST_TURNED,
     beside_edges,
     check_type,
@@ -229,6 +230,7 @@ class Shape:
             its goals cross themselves or have no width, or if a part of it is outside and it is neither scaled nor has
             goals: the edge closes it, and what flows along that.
         extent: the sides of the picture, which lines do not leave.
+        cell: a side of the fluid's cells, longer sides; see `edges`.
     """
 
     handle: Handle
@@ -236,9 +238,10 @@ class Shape:
     goals: np.ndarray | None
     around: int | None
     extent: Point
+    cell: float = 0.0
 
     @classmethod
-    def of(cls, handle: Handle, extent: Point) -> Shape:
+    def of(cls, handle: Handle, extent: Point, cell: float = 0.0) -> Shape:
         """What a handle leads of a picture with these sides."""
         goals, around = None, None
         if handle.points:
@@ -258,7 +261,7 @@ class Shape:
             led, goals = led[inside], goals if goals is None else goals[inside]
         if handle.closed and any(_crosses_itself(line) or _is_flat(line) for line in (led, goals) if line is not None):
             around = None  # the areas of its loops cancel, or there is none: what is left tells of no growth
-        return cls(handle, led, goals, around if len(led) >= 3 + (around or 0) else None, extent)
+        return cls(handle, led, goals, around if len(led) >= 3 + (around or 0) else None, extent, cell)
 
     @property
     def is_ring(self) -> bool:
@@ -281,10 +284,12 @@ class Shape:
         """Where its points shall be at a time, (n, 2), if they were at `starts` when it began; see `Handle.wanted`."""
         handle, middle = self.handle, self.middle(starts)
         there = handle.wanted(middle, time, dt)
+        if not handle.points:
+            there = np.clip(there, *self.edges(middle))
         if len(starts) == 1:
             return there[None]
         there = self._about(there, starts, time, dt)
-        way = (there if self.is_ring else np.clip(there, *beside_edges(starts, self.extent))) - starts
+        way = (np.clip(there, *self.edges(starts)) if handle.points else there) - starts
         far = np.hypot(*way.T)[:, None]
         return starts + way * np.minimum(1.0, LARGEST_LEAD * handle.reach / np.maximum(far, 1e-30))
 
@@ -293,6 +298,26 @@ class Shape:
         handle = self.handle
         time = max(time, handle.ready, handle.upright)
         return self._about(handle.wanted(self.middle(starts), time, dt, math.inf), starts, time, dt)
+
+    def edges(self, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Between which places what was at `starts` may be led.
+
+        Points of a line: as `beside_edges`. A point by itself, as what lies before it flows off to its sides: up to a
+        cell from the picture's edge, since the fluid resolves no less; and nearer if it began nearer.
+        """
+        if self.handle.points:
+            return beside_edges(starts, self.extent)
+        inside, extent = np.clip(starts, 0.0, self.extent), np.array(self.extent)
+        return np.minimum(inside / MOST_STRETCH, self.cell), extent - np.minimum(
+            (extent - inside) / MOST_STRETCH, self.cell
+        )
+
+    def short_of_edges(self, starts: np.ndarray) -> float:
+        """How far what is farthest of it stays from its last goal, which is nearer to an edge than it is led."""
+        ends = self.due(starts, math.inf, 1.0)
+        if not self.handle.points:
+            starts, ends = starts[:1], ends[:1]
+        return float(np.hypot(*(np.clip(ends, *self.edges(starts)) - ends).T).max())
 
     def away(self, places: np.ndarray, ends: np.ndarray) -> float:
         """How far what is farthest of it is from these places; of a ring, by how far it is turned and scaled."""

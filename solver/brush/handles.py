@@ -22,7 +22,7 @@ from solver.brush.pushes import Pushes
 from solver.brush.tip import SMALLEST, Tip
 from solver.faces import Forces
 from solver.gl.field import Field
-from solver.limits import LEAST_STIFFNESS, check_step, check_type, short_of_edges
+from solver.limits import LEAST_STIFFNESS, check_step, check_type
 from solver.scheme import Scheme
 from solver.state import State
 from solver.warp.inverse import ForwardMap
@@ -157,8 +157,8 @@ class Handles:
         for handle in handles:
             check_type("a handle", handle, Handle)
         known = {id(shape.handle): shape for shape in self._shapes}
-        self.handles = tuple(handles)
-        self._shapes = [known.get(id(handle)) or Shape.of(handle, self._warp.extent) for handle in handles]
+        self.handles, cell = tuple(handles), max(self._fluid.grid.spacing)
+        self._shapes = [known.get(id(handle)) or Shape.of(handle, self._warp.extent, cell) for handle in handles]
         before, self._counts = self._counts, np.array([len(shape.led) for shape in self._shapes], int)
         self._rows = _runs(self._counts)
         self._at = np.concatenate([np.zeros((0, 2)), *(shape.led for shape in self._shapes)])
@@ -223,7 +223,9 @@ class Handles:
         slower = np.repeat(slower * self._progressing(active, targets, time, dt), counts)
         wanted, growths = self._wanted(active, slower, targets, dt)
         for which, tip, local in swelling_tips:
-            self._brush.expand(self._fluid, tip, (1 - local) * growths[which])
+            if rate := (1 - local) * growths[which]:
+                self._expected.begin()
+                self._brush.expand(self._fluid, tip, rate)
         self._calm(places[pushed], np.where(is_led & is_away, wide, radii)[pushed], 1 - slower[pushed])
         # What halts lets go: at rest among others that flow by it would strain the map around it as if it were led.
         firm = np.where(is_led, np.maximum(slower, LEAST_STIFFNESS), 1.0)
@@ -323,7 +325,7 @@ class Handles:
         """Why each is not where it is led; None if that is less than a texel of the map away.
 
         "outside": nothing of it lies in the picture. "waiting": it has not begun. "over": its end has come. "edge": its
-        goal is farther than a line goes beside the picture's edge. "strain": the map around it slows it down so far
+        goal is farther than it goes beside the picture's edge. "strain": the map around it slows it down so far
         that it would let go by that alone. It has let go: "at odds" where others are held, "soft" where it leads with
         less than all its stiffness, else "alone". "under way": its goal is. "late": that rests, and it comes nearer.
         """
@@ -343,7 +345,7 @@ class Handles:
                 found.append("waiting")
             elif shape.handle.end < time:
                 found.append("over")
-            elif shape.handle.points and short_of_edges(starts, shape.due(starts, math.inf, 1.0), shape.extent) > FOUND:
+            elif shape.short_of_edges(starts) > FOUND:
                 found.append("edge")
             else:
                 is_strained = slower[rows].min() * RATE * PATIENCE < math.log(2)  # (H1): no half in that time
@@ -532,8 +534,7 @@ class Handles:
 
     def _slower(self, strain: np.ndarray, numbers: np.ndarray) -> np.ndarray:
         least, most, area_left, kept = strain.T
-        grown, local = self._grown(), self._locality(numbers)
-        kept, left = kept * grown, np.minimum(least, area_left) * grown
+        local, left = self._locality(numbers), np.minimum(least, area_left) * self._grown(numbers)
         slowing = SLOWING + local * (SLOWING_LOCAL - SLOWING)
         stopped = STOPPED + local * (STOPPED_LOCAL - STOPPED)
         resolved = _smoothstep((kept - stopped) / (slowing - stopped))
@@ -543,19 +544,25 @@ class Handles:
     def _locality(self, numbers: np.ndarray) -> np.ndarray:
         """The least local part of each of these points and of what has begun beside it: all of them drive the fluid."""
         begun = np.flatnonzero(~np.isnan(self._starts[:, 0]))
-        here, there = self._places[numbers].T, self._places[begun].T
-        far = np.hypot(here[0][:, None] - there[0], here[1][:, None] - there[1])
-        meet = far < self._radii[numbers, None] + self._radii[begun]
-        return np.minimum(self._local[numbers], np.where(meet, self._local[begun], 1.0).min(axis=1, initial=1.0))
+        beside = np.where(self._meet(numbers, begun), self._local[begun], 1.0)
+        return np.minimum(self._local[numbers], beside.min(axis=1, initial=1.0))
 
-    def _grown(self) -> float:
-        """How many times as large as in the original the area is that has grown most within a closed line."""
-        grown = [1.0]
+    def _grown(self, numbers: np.ndarray) -> np.ndarray:
+        """How many times its size in the original what swells beside each of these points shall have; at least 1."""
+        grown = np.ones(len(numbers))
         for shape, rows in zip(self._shapes, self._rows, strict=True):
-            if shape.around is not None and not np.isnan(self._places[rows]).any():
-                now, before = (area(places[shape.around :]) for places in (self._places[rows], shape.led))
-                grown.append(now / before if before else 1.0)
-        return max(grown)
+            if shape.around is not None and not np.isnan(starts := self._starts[rows]).any():
+                wanted = shape.wanted(starts, self._fluid.time, 1.0)
+                due, before = (area(places[shape.around :]) for places in (wanted, shape.led))
+                near = self._meet(numbers, np.arange(rows.start, rows.stop)).any(axis=1)
+                grown[near] = np.maximum(grown[near], due / before if before else 1.0)
+        return grown
+
+    def _meet(self, numbers: np.ndarray, others: np.ndarray) -> np.ndarray:
+        """Whether what is within reach of these points (n) and of those (m) overlaps, (n, m)."""
+        here, there = self._places[numbers].T, self._places[others].T
+        far = np.hypot(here[0][:, None] - there[0], here[1][:, None] - there[1])
+        return far < self._radii[numbers, None] + self._radii[others]
 
     # -- what they do to the fluid ----------------------------------------------------------------------------------
 

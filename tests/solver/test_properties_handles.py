@@ -1,13 +1,19 @@
-"""Lines led at random; more seeds: tests/nightly.py -k handles."""
+"""Lines, and recipes with handles, at random; more seeds: tests/nightly.py -k handles."""
 
 from __future__ import annotations
 
 import pytest
 
 from properties.handles import check_lines
+from properties.led import check_handles_fold_nothing
 from solver import Device
 
 
 @pytest.mark.parametrize("seed", [1])
 def test_lines_led_at_random_fold_nothing_and_come_to_rest(seed: int, device: Device):
     assert check_lines(device, seed, cells=16, texels=64)["without a reason"] == 0
+
+
+@pytest.mark.parametrize("seed", [102, 116])  # that folded: what had grown elsewhere excused it; pressed to the edge
+def test_handles_in_a_recipe_fold_nothing(seed: int, device: Device):
+    check_handles_fold_nothing(device, seed)

@@ -1,0 +1,150 @@
+"""Recipes as people make them, with handles among everything else: they fold nothing but what folds without them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from app.media.auxiliary import Pictures
+from app.model.recipe import Recipe
+from app.work.replay import Replay
+from solver.gl.device import Device
+from support.editing import pattern
+
+DT = 1 / 60
+MOST_TICKS = 96
+
+
+def _place(rng: np.random.Generator, margin: float = 0.03) -> list[float]:
+    return rng.uniform(margin, 1 - margin, 2).round(4).tolist()
+
+
+def _line(rng: np.random.Generator, led: dict[str, Any]) -> None:
+    """Give a handle or a pin a line or an outline about its place."""
+    closed, count, size = bool(rng.random() < 0.5), int(rng.integers(3, 9)), rng.uniform(0.04, 0.2)
+    angle = rng.uniform(0, 2 * np.pi)
+    if closed:
+        angles = angle + (rng.uniform(0, 0.8, count) + np.arange(count)) * 2 * np.pi / count
+        corners = led["at"] + size * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    else:
+        along = np.linspace(-size, size, count)[:, None] * [np.cos(angle), np.sin(angle)]
+        corners = led["at"] + along + rng.normal(0, 0.1 * size, (count, 2))
+    led |= {"points": corners.round(4).tolist(), "closed": closed}
+
+
+def random_handle(rng: np.random.Generator, seconds: float) -> dict[str, Any]:
+    """A point, a line or an outline, which goes somewhere, on, turns and grows."""
+    handle: dict[str, Any] = {
+        "at": _place(rng),
+        "radius": round(float(np.exp(rng.uniform(np.log(0.04), np.log(0.35)))), 4),
+    }
+    if rng.random() < 0.35:
+        _line(rng, handle)
+    way, angle = handle["radius"] * rng.uniform(0.3, 1.5), rng.uniform(0, 2 * np.pi)
+    handle["to"] = (np.array(handle["at"]) + way * np.array([np.cos(angle), np.sin(angle)])).round(4).tolist()
+    handle["duration"] = round(rng.uniform(0.1, 0.6) * seconds, 3)
+    if rng.random() < 0.3:
+        handle["start"] = round(rng.uniform(0, 0.4) * seconds, 3)
+    ready = handle.get("start", 0.0) + handle["duration"]
+    if rng.random() < 0.3:
+        on = (np.array(handle["to"]) + 0.7 * way * rng.uniform(-1, 1, 2)).round(4).tolist()
+        handle["keys"] = [[round(ready + rng.uniform(0.1, 0.4) * seconds, 3), *on]]
+    if rng.random() < 0.3:
+        handle |= {"rotate": round(rng.uniform(-90, 90), 1), "scale": round(float(np.exp(rng.uniform(-0.5, 0.5))), 3)}
+    if rng.random() < 0.5:
+        handle["local"] = round(float(rng.choice([rng.uniform(0, 1), 1.0])), 3)
+    if rng.random() < 0.15:
+        handle["stiffness"] = round(float(np.exp(rng.uniform(-4, 0))), 4)
+    if rng.random() < 0.1:
+        handle["end"] = round(ready, 3)
+    return handle
+
+
+def _stroke(rng: np.random.Generator, tool: str, first: int, ticks: int) -> dict[str, Any]:
+    start, end = (np.array(_place(rng, 0.0)) for _ in range(2))
+    end = start + (end - start) * min(1.0, 0.3 / max(np.hypot(*(end - start)), 1e-9))
+    samples = [
+        [first + tick, *(start + (end - start) * tick / max(ticks - 1, 1)).round(4).tolist(), 1.0]
+        for tick in range(ticks)
+    ]
+    radius = round(float(np.exp(rng.uniform(np.log(0.02), np.log(0.2)))), 4)
+    return {"tool": tool, "radius": radius, "hardness": round(rng.uniform(0, 1), 3), "samples": samples}
+
+
+def random_recipe(rng: np.random.Generator) -> dict[str, Any]:
+    """One to six handles among pins, thick and frozen places, pushes and a vortex."""
+    ticks = int(rng.integers(24, MOST_TICKS))
+    seconds = ticks * DT
+    viscosity, drag = [(0.001, 0.0), (0.01, 0.5), (0.1, 3.0), (1.0, 12.0)][int(rng.integers(4))]
+    recipe: dict[str, Any] = {
+        "version": 5,
+        "duration": round(seconds, 4),
+        "fluid": {"grid": int(rng.choice([32, 48])), "dt": DT, "viscosity": viscosity, "drag": drag},
+        "handle": [random_handle(rng, seconds) for _ in range(int(rng.integers(1, 7)))],
+    }
+    pins = []
+    for _ in range(int(rng.integers(0, 3))):
+        pin: dict[str, Any] = {"at": _place(rng), "radius": round(rng.uniform(0.05, 0.3), 3)}
+        if rng.random() < 0.3:
+            _line(rng, pin)
+        pins.append(pin)
+    if pins:
+        recipe["pin"] = pins
+    strokes = []
+    for tool in ("thicken", "freeze"):
+        strokes += [_stroke(rng, tool, 0, int(rng.integers(1, 12))) for _ in range(int(rng.integers(0, 3)))]
+    for _ in range(int(rng.integers(0, 3))):
+        first = int(rng.integers(0, ticks - 10))
+        strokes.append(
+            _stroke(rng, str(rng.choice(["push", "push", "twirl", "bloat"])), first, int(rng.integers(4, 11)))
+        )
+    if strokes:
+        recipe["stroke"] = sorted(strokes, key=lambda stroke: stroke["samples"][0][0])
+    if rng.random() < 0.2:
+        vortex = {"kind": "vortex", "point": _place(rng), "radius": 0.2, "strength": round(rng.uniform(-2, 2), 2)}
+        recipe["force"] = [vortex]
+    return recipe
+
+
+def played(device: Device, data: dict[str, Any], aspect: tuple[int, int]) -> tuple[int, float, int]:
+    """The most places that fold at once, the least det J, and the first tick that folds or -1, while it is played."""
+    import tomlkit
+
+    recipe = Recipe.parse(tomlkit.dumps(data))
+    worst, least, first = 0, np.inf, -1
+    replay = Replay(device, recipe, Pictures(pattern(*aspect), Path()))
+    try:
+        for tick in range(recipe.ticks):
+            replay.advance()
+            if tick % 4 == 3 or tick == recipe.ticks - 1:
+                found = replay.warp.statistics()
+                worst, least = max(worst, found.folds), min(least, found.det_min)
+                if found.folds and first < 0:
+                    first = tick
+        assert np.isfinite(replay.warp.read()).all()
+        assert np.isfinite(replay.fluid.velocity_at_centres()).all()
+    finally:
+        replay.release()
+    return worst, float(least), first
+
+
+def scene(seed: int) -> tuple[dict[str, Any], tuple[int, int]]:
+    """A recipe, and the size of its picture."""
+    rng = np.random.default_rng(seed)
+    recipe = random_recipe(rng)
+    texels = recipe["fluid"]["grid"] * int(rng.choice([4, 8]))
+    return recipe, [(texels, texels), (texels, 3 * texels // 4), (3 * texels // 4, texels)][int(rng.integers(3))]
+
+
+def check_handles_fold_nothing(device: Device, seed: int) -> dict[str, float]:
+    """No place folds, unless it does without the handles, too."""
+    recipe, size = scene(seed)
+    folds, least, first = played(device, recipe, size)
+    if folds:
+        without = {key: value for key, value in recipe.items() if key not in ("handle", "pin")}
+        alone, _, _ = played(device, without, size)
+        assert alone, f"{folds} places fold, the first at tick {first}, least det J {least:.3f}"
+        return {"folded without handles": 1.0}
+    return {"least det J, from 1": 1 - least}
