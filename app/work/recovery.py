@@ -113,11 +113,7 @@ class Journal:
         is_just_saved = bool(before) and before[0] is not project
         if is_just_saved or not work.is_unsaved:
             work = None
-        is_amended = (
-            work is not None
-            and self._wanted is not None
-            and (len(work.entries), work.index) == (len(self._wanted[1].entries), self._wanted[1].index)
-        )
+        is_amended = work is not None and self._wanted is not None and work.edits == self._wanted[1].edits
         if work is None and self._wanted is None and self._held is None:
             return
         with self._asking:

@@ -145,6 +145,22 @@ def files_in(root: Path) -> list[str]:
 # The journal of one work ---------------------------------------------------------------------------------------------
 
 
+def test_a_stroke_for_which_the_oldest_one_goes_waits_for_no_pause(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+    """There are no more of them than before, as while the fluid comes to rest."""
+    desk.push()
+    history = desk.document.history
+    desk.push()
+    desk.write()
+    history.budget = history.nbytes + history.entries[-1].nbytes - 1
+    count = len(history.entries)
+    monkeypatch.setattr(recovery, "PAUSE", 1e3)
+    desk.push()
+    assert len(history.entries) == count
+    desk.write()
+    desk.die()
+    assert is_all_of(found_in(desk.root), desk.document)
+
+
 def test_what_was_not_saved_is_found(desk: Desk) -> None:
     desk.push(3)
     desk.document.history.undo()
