@@ -419,6 +419,36 @@ def test_what_cannot_be_read_is_left_alone_with_a_sentence(desk: Desk, data: byt
     assert file.read_bytes() == data
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="links and pipes are made otherwise there")
+@pytest.mark.parametrize("what", ["folder", "link", "pipe"])
+@pytest.mark.parametrize("place", [recovery.JOURNAL, "lock", ".", ".."])
+def test_what_is_no_file_is_told_in_a_sentence_and_nothing_of_it_is_removed(desk: Desk, what: str, place: str) -> None:
+    desk.push()
+    desk.die()
+    folder = next(desk.root.rglob(recovery.JOURNAL)).parent
+    path = Path(os.path.normpath(folder / place))
+    path.rename(kept := desk.root.parent / "kept")
+    if what == "link":
+        path.symlink_to(path.name)
+    elif what == "folder" or place == ".":
+        path.mkdir()
+        (path / "inside").write_text("of somebody")
+    else:
+        os.mkfifo(path)
+    before = sorted(path.rglob("*"))
+    found, notices = find(desk.root)
+    for one in found:
+        one.leave()
+    assert found == [] or (place, what) == ("lock", "pipe")  # which can be locked as any file
+    is_foreign = what != "link" and place in (".", "..")
+    assert len(notices) == (not found and not is_foreign)
+    assert all(" (" in notice or place == recovery.JOURNAL for notice in notices)
+    assert all("left there" in notice and str(desk.root) in notice for notice in notices)
+    assert os.path.lexists(path)
+    assert sorted(path.rglob("*")) == before
+    assert kept.exists()
+
+
 @pytest.mark.parametrize("is_project", [False, True])
 def test_a_picture_that_is_gone_is_told_and_the_work_kept(desk: Desk, tmp_path: Path, is_project: bool) -> None:
     """By its own name, also where a project names it."""
