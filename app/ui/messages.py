@@ -86,9 +86,12 @@ class Messages:
         if not self.shown:
             return
         message, others = self.shown[-1], len(self.shown) - 1
-        width = min(ui.px(440), max(canvas.width / 2 - ui.px(165), ui.px(260)), canvas.width - ui.px(24))
+        beside = canvas.width / 2 - ui.px(165)  # of what tells of work under way
+        # Where there is no room for that it lies below, and is as wide and low as it can be.
+        width = min(ui.px(440), beside if beside >= ui.px(260) else ui.px(440), canvas.width - ui.px(24))
         right, top = canvas.right - ui.px(12), canvas.y + ui.px(12)
-        above = (rect for rect in ui.covering if rect.y < top + ui.px(12) and rect.right > right - width)
+        lying = [*ui.covering, *ui.floating_over]
+        above = (rect for rect in lying if rect.y < top + ui.px(12) and rect.right > right - width)
         top = max([top, *(rect.bottom + ui.px(8) for rect in above)])
         imgui.set_next_window_pos(ImVec2(right, top), imgui.Cond_.always, ImVec2(1.0, 0.0))
         imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(ui.px(14), ui.px(10)))
