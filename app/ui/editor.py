@@ -50,7 +50,6 @@ from solver.gl.field import GraphicsMemoryError
 
 AWAITING = 0.02  # seconds between two looks at whether a frame of a clip has been decoded
 TOLD = 2  # frames after a click or a key that may begin or end typing, in which imgui tells whether text is typed
-BELOW = 64.0  # points that what is told of a fit lies below what is told of an export
 
 
 class Editor:
@@ -408,7 +407,7 @@ class Editor:
             self.session.notice = None
         self.cautions.look()
         self.exports.draw(self.ui, self.layout.canvas)
-        self.fits.draw(self.ui, self.layout.canvas, BELOW if self.exports.is_running else 0.0)
+        self.fits.draw(self.ui, self.layout.canvas)
         self.files.draw(self.ui, self.layout.canvas)
         self.messages.draw(self.ui, self.layout.canvas)
         self.files.poll()

@@ -137,6 +137,15 @@ class Ui:
         """Take note that the window being drawn lies on the canvas."""
         self.covering.append(self._window())
 
+    def free_below(self, left: float, right: float, top: float) -> float:
+        """How far down from `top` something may begin that lies on the canvas from `left` to `right`: below all that
+        has been drawn there before.
+        """
+        for rect in sorted([*self.covering, *self.floating_over], key=lambda rect: rect.y):
+            if rect.y < top + self.px(12) and rect.x < right and rect.right > left:
+                top = max(top, rect.bottom + self.px(8))
+        return top
+
     def _window(self) -> Rect:
         place, size = imgui.get_window_pos(), imgui.get_window_size()
         return Rect(place.x, place.y, size.x, size.y)
