@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from app.model.handles import RecipeHandle, RecipePin, heading
 from app.model.tools import TOOL
 from app.ui.messages import Messages
 from app.ui.workspace import Workspace
-from app.work.handle_status import ANEW, FIT
+from app.work.handle_status import ANEW, FIT, Held
 from app.work.session import Session
 
 TOLD = 3  # sentences in a message; the inspector has all of them
@@ -17,7 +19,7 @@ Led = tuple[tuple[RecipeHandle, ...], tuple[RecipePin, ...]]
 class Cautions:
     """Tells, each time once, which handles contradict each other, and which have come to rest where they should not.
 
-    And that the warp folds over itself, once until it does not any more.
+    And that the warp folds over itself, once until it does not any more; and which held back a stroke.
     """
 
     def __init__(self, workspace: Workspace, messages: Messages) -> None:
@@ -25,6 +27,8 @@ class Cautions:
         self._session: Session | None = None
         self._led: Led | None = None  # what the known ones are of
         self._folds = False  # as was known last
+        self._edit = 0  # the number of the last one that was looked at
+        self._held_back = set[str]()  # who is known to hold
         self._known: set[str] = set()  # sentences, and what is unmet by its label: how far it is changes
 
     def look(self) -> None:
@@ -36,7 +40,9 @@ class Cautions:
         said = {each: each for each in session.objections} | {label: each.said for label, each in unmet.items()}
         if session is not self._session:
             self._session, self._known, self._folds = session, set(), False
+            self._edit, self._held_back = session.document.history.entries[session.document.history.index].number, set()
         self._look_at_folds(session)
+        self._look_at_held(session)
         new = {key: sentence for key, sentence in said.items() if key not in self._known}
         led = _led(session)
         # While it moves, or is looked at before its end, nobody can tell what will be unmet.
@@ -65,6 +71,36 @@ class Cautions:
                 lambda: session is self._workspace.session and self._folds,
             )
         self._folds = folds > 0
+
+    def _look_at_held(self, session: Session) -> None:
+        """Tell of a handle that holds its place against the stroke that has just been drawn over it."""
+        history = session.document.history
+        entry = history.entries[history.index]
+        if entry.number <= self._edit:
+            return
+        self._edit = entry.number
+        strokes, before = entry.recipe.stroke, history.entries[max(history.index - 1, 0)].recipe.stroke
+        if len(strokes) <= len(before) or not entry.recipe.leads or not _moves(strokes[-1].tool):
+            return
+        new = [held for held in session.held if held.label not in self._held_back and _is_over(session, held)]
+        if new:
+            self._held_back |= {held.label for held in new}
+            self._messages.caution(
+                f"{heading(new[0].label)} holds its place, so that the stroke moves less there. "
+                "To push it freely, mute or remove it first."
+            )
+
+
+def _moves(tool: str) -> bool:
+    return tool in TOOL and not TOOL[tool].masks and tool != "restore"
+
+
+def _is_over(session: Session, held: Held) -> bool:
+    """The last stroke's brush has been over what a handle holds."""
+    stroke = session.document.recipe.stroke[-1]
+    path = np.array([sample[1:3] for sample in stroke.samples]) * session.extent
+    places = np.array([held.now, *held.line]) * session.extent
+    return bool(np.min(np.linalg.norm(path[:, None] - places[None], axis=-1)) <= stroke.radius)
 
 
 def _led(session: Session) -> Led:

@@ -38,6 +38,7 @@ from app.ui.pointer import PointerController
 from app.ui.preferences import Preferences
 from app.ui.quality import Quality
 from app.ui.recovery_dialog import Recovery
+from app.ui.rehearsal import Rehearsal
 from app.ui.selecting import Selecting
 from app.ui.viewport import Viewport
 from app.ui.widgets import Ui
@@ -49,7 +50,6 @@ from solver.gl.field import GraphicsMemoryError
 
 AWAITING = 0.02  # seconds between two looks at whether a frame of a clip has been decoded
 TOLD = 2  # frames after a click or a key that may begin or end typing, in which imgui tells whether text is typed
-BELOW = 64.0  # points that what is told of a fit lies below what is told of an export
 
 
 class Editor:
@@ -89,7 +89,10 @@ class Editor:
         )
         self.exports = Exports(self.messages)
         self.cautions = Cautions(self.workspace, self.messages)
-        self.quality = Quality(self.workspace, self.state, self.files, self.exports, self.fits, self.messages)
+        self.rehearsal = Rehearsal(self.workspace)
+        self.quality = Quality(
+            self.workspace, self.state, self.files, self.exports, self.fits, self.messages, self.rehearsal
+        )
         self.recovery = Recovery(self.journals, self.dialogs, self.messages, self.files.restore)
         self.selecting = Selecting(self.workspace, self.state, self.messages)
         self.pointer = PointerController(
@@ -152,6 +155,7 @@ class Editor:
         self.journals.release(discard=self.commands.closed)
         self.dialogs.release()
         self.quality.release()
+        self.rehearsal.release()
         self.workspace.release()
         self.backend.release()
 
@@ -207,12 +211,20 @@ class Editor:
             self.workspace.keep()
         if self.quality.is_measuring:
             self.quality.warm_up(begun)
+        elif self._is_rehearsing:
+            self.rehearsal.go_on()
 
     def wants_frame(self) -> bool:
         """True while something moves by itself."""
-        busy = self.quality.is_measuring or self.quality.is_preparing
+        busy = self.quality.is_measuring or self.quality.is_preparing or self._is_rehearsing
         waits = self.backend.is_behind or bool(self._later or self._once_typed)
         return busy or waits or self.session.is_moving or self.clock.settling or self.canvas.is_unfinished
+
+    @property
+    def _is_rehearsing(self) -> bool:
+        """There is time for what the person will do."""
+        elsewhere = self.exports.is_running or self.fits.is_running or self.files.is_loading
+        return self.rehearsal.is_wanted and not (elsewhere or self.quality.is_preparing)
 
     def wait(self) -> float:
         """Seconds that may pass before the next frame if no event comes."""
@@ -282,6 +294,9 @@ class Editor:
         return Layout.of(width, height, self.ui.scale, is_open, len(TOOLS), groups, names, lanes_height)
 
     def _advance(self, dt: float) -> None:
+        if self.rehearsal.is_needed:
+            self.rehearsal.go_on()
+            return
         try:
             self.session.advance(self.clock.ticks(dt, self.session.dt, self.session.is_moving))
         except UserError as error:
@@ -392,7 +407,7 @@ class Editor:
             self.session.notice = None
         self.cautions.look()
         self.exports.draw(self.ui, self.layout.canvas)
-        self.fits.draw(self.ui, self.layout.canvas, BELOW if self.exports.is_running else 0.0)
+        self.fits.draw(self.ui, self.layout.canvas)
         self.files.draw(self.ui, self.layout.canvas)
         self.messages.draw(self.ui, self.layout.canvas)
         self.files.poll()

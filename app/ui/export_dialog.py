@@ -560,21 +560,25 @@ class Exports:
         state = f": {process.state}" if process.state else ""
         copied = self._copied is not None
         words = f"Copying {process.job.target.stem}" if copied else f"Exporting {process.job.target.name}"
-        if under_way(ui, "exporting", canvas, 0.0, words + state, process.part, "Cancel"):
+        if under_way(ui, "exporting", canvas, words + state, process.part, "Cancel"):
             self.cancel()
             self.messages.say("Cancelled; no unfinished file is kept.")
 
 
 def under_way(
-    ui: Ui, name: str, canvas: Rect, down: float, words: str, part: float, button: str, key: str = "", more: str = ""
+    ui: Ui, name: str, canvas: Rect, words: str, part: float, button: str, key: str = "", more: str = ""
 ) -> bool:
-    """What is being done and how much of it, so many points below the canvas's edge; True if the button is pressed.
+    """What is being done and how much of it, at the canvas's upper edge; True if the button is pressed.
 
     `button`: what it says; empty where nothing can be stopped.
     """
-    with ui.floating(name, canvas.x + canvas.width / 2, canvas.y + ui.px(16 + down), (0.5, 0)):
+    width = max(min(ui.px(280), canvas.width - ui.px(140)), ui.px(60))
+    middle, half = canvas.middle[0], width / 2 + ui.px(60)
+    top = ui.free_below(middle - half, middle + half, canvas.y + ui.px(16))
+    if top > canvas.y + ui.px(16) and top + ui.px(60) > canvas.bottom:
+        return False  # there is no room for both
+    with ui.floating(name, middle, top, (0.5, 0)):
         imgui.begin_group()
-        width = max(min(ui.px(280), canvas.width - ui.px(140)), ui.px(60))
         imgui.push_text_wrap_pos(imgui.get_cursor_pos_x() + width)
         ui.text(words, size=14)
         imgui.pop_text_wrap_pos()

@@ -267,7 +267,10 @@ class Files:
             return
         session = self.workspace.session
         is_sample = session is self.workspace.placeholder and not session.has_begun
-        with ui.floating("loading", canvas.x + canvas.width / 2, canvas.y + ui.px(16), (0.5, 0)):
+        middle, half = canvas.middle[0], ui.px(160)
+        with ui.floating(
+            "loading", middle, ui.free_below(middle - half, middle + half, canvas.y + ui.px(16)), (0.5, 0)
+        ):
             imgui.begin_group()
             ui.text(f"Opening {self._loading.name} ...", size=14)
             ui.dim("The picture below is a sample." if is_sample else "You can go on meanwhile.")

@@ -97,8 +97,8 @@ class Fits:
     def _end(self) -> None:
         self.process = self._session = self._of = None
 
-    def draw(self, ui: Ui, canvas: Rect, down: float) -> None:
-        """How far it is and how near it comes, so many points below the canvas's edge; with a button to stop it."""
+    def draw(self, ui: Ui, canvas: Rect) -> None:
+        """How far it is and how near it comes, with a button to stop it."""
         if (process := self.process) is None:
             return
         process.poll()
@@ -114,7 +114,7 @@ class Fits:
             state = "checking the best" if self._stopping else process.state or "getting ready"
             words, more = f"Fitting: {state}", "The best that was found so far is kept."
             button = "" if self._stopping else "Stop"
-            if under_way(ui, "fitting", canvas, down, words, process.part, button, "escape", more):
+            if under_way(ui, "fitting", canvas, words, process.part, button, "escape", more):
                 self.finish()
 
     def _is_still_of_use(self) -> bool:

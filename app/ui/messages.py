@@ -16,6 +16,8 @@ from app.ui.widgets import PANEL, Ui, fitting
 
 SECONDS = 5.0
 MOST = 3
+LEAST = 70.0  # points of the canvas's height that a message needs
+ABOVE = 54.0  # and that it leaves to the zoom
 
 
 @dataclass
@@ -86,10 +88,14 @@ class Messages:
         if not self.shown:
             return
         message, others = self.shown[-1], len(self.shown) - 1
-        width = min(ui.px(440), max(canvas.width / 2 - ui.px(165), ui.px(260)), canvas.width - ui.px(24))
-        right, top = canvas.right - ui.px(12), canvas.y + ui.px(12)
-        above = (rect for rect in ui.covering if rect.y < top + ui.px(12) and rect.right > right - width)
-        top = max([top, *(rect.bottom + ui.px(8) for rect in above)])
+        beside = canvas.width / 2 - ui.px(165)  # of what tells of work under way
+        # Where there is no room for that it lies below, and is as wide and low as it can be.
+        width = min(ui.px(440), beside if beside >= ui.px(260) else ui.px(440), canvas.width - ui.px(24))
+        right = canvas.right - ui.px(12)
+        top = ui.free_below(right - width, right, canvas.y + ui.px(12))
+        if top > canvas.y + ui.px(12) and top + ui.px(LEAST) > canvas.bottom - ui.px(ABOVE):
+            message.seen = False  # it waits until there is room
+            return
         imgui.set_next_window_pos(ImVec2(right, top), imgui.Cond_.always, ImVec2(1.0, 0.0))
         imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(ui.px(14), ui.px(10)))
         imgui.push_style_var(imgui.StyleVar_.window_rounding, ui.px(9))
@@ -101,7 +107,7 @@ class Messages:
         ink = packed(ui.palette.accent)
         icons.draw(imgui.get_window_draw_list(), message.icon, corner.x, corner.y, ui.px(18), ink)
         room = width - ui.px(80)
-        height = canvas.middle[1] - top - ui.px(24)
+        height = min(max(canvas.middle[1] - top, ui.px(LEAST)), canvas.bottom - ui.px(ABOVE) - top) - ui.px(24)
         words = fitting(message.text, room, height)
         text = imgui.calc_text_size(words, wrap_width=room)
         imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + ui.px(28))

@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 from statistics import median_low
 
 from app.model.strokes import Stroke
-from app.ui.canvas import MOVING
 from app.ui.editor_state import EditorState
 from app.ui.export_dialog import Exports
 from app.ui.files import Files, fresh_recipe, settings_of
 from app.ui.fitting import Fits
 from app.ui.messages import Messages
+from app.ui.rehearsal import Interrupted, Rehearsal, look_at
 from app.ui.workspace import Workspace
 from app.work.recovery import Found
 from app.work.replay import Replay
@@ -30,6 +30,7 @@ WANTED = 30.0  # frames a second while painting
 SPARE = 0.3
 TRIALS = (256, 128)  # cells, of the grids that the machine is measured on
 TICKS = 8  # on each of them, and as many frames without
+COMPILING = 2  # of them, which are not measured
 FAST = 4.0  # milliseconds; a tick that takes less may be made 60 times a second
 
 
@@ -73,6 +74,7 @@ class Quality:
 
     Attributes:
         files, exports, fits: what is read, written and searched has the machine first.
+        rehearsal: what is measured also compiles, and can be interrupted like it.
         speed: of this machine, once it has been measured.
         grid: that painting has been well on.
     """
@@ -83,6 +85,7 @@ class Quality:
     exports: Exports
     fits: Fits
     messages: Messages
+    rehearsal: Rehearsal
     speed: Speed | None = None
     grid: int | None = None
     _session: Session | None = field(default=None, init=False)  # that is watched
@@ -154,13 +157,19 @@ class Quality:
         `time.perf_counter`.
         """
         self._frames += 1
-        session, view = self.workspace.session, self.workspace.view
+        session = self.workspace.session
         if self._frames < 2 or session.is_moving:
             return
-        if self._trial is not None:
-            self._trial.advance()
-            shown = view.canvas.width, view.canvas.height
-            self._trial.warp.composed(tuple(max(1, round(side * view.density / MOVING)) for side in shown))
+        if self._trial is not None and len(self._spent[-1]) < COMPILING:
+            try:
+                with self.rehearsal.interruptible(session.device):
+                    self._try()
+            except Interrupted:
+                self.release()
+                self._trial, self._spent[-1] = self._new_trial(TRIALS[len(self._spent) - 2]), []
+                return
+        elif self._trial is not None:
+            self._try()
         session.device.ctx.finish()
         self._spent[-1].append((time.perf_counter() - begun) * 1e3)
         if len(self._spent[-1]) < TICKS:
@@ -170,11 +179,15 @@ class Quality:
             self._trial = self._new_trial(TRIALS[len(self._spent) - 1])
             self._spent.append([])
         else:
-            # The first ones compile.
-            drawing, fine, coarse = (median_low(frames[2:]) for frames in self._spent)
+            drawing, fine, coarse = (median_low(frames[COMPILING:]) for frames in self._spent)
             self.speed = Speed.of(fine, coarse, drawing)
             self.grid = self.speed.best_grid
             self._begin()
+
+    def _try(self) -> None:
+        assert self._trial is not None
+        self._trial.advance()
+        look_at(self._trial, self.workspace.view)
 
     def _new_trial(self, grid: int) -> Replay:
         """A push of which the picture on the canvas knows nothing."""

@@ -136,10 +136,14 @@ class Offer(Dialog):
         right, what = imgui.get_content_region_avail().x, about(found, date.today())
         is_narrow = imgui.calc_text_size(what).x > right - ui.px(224)
         across = ui.px(100 if is_narrow else 208)
+        room = right - across - ui.px(16)
         imgui.begin_group()
-        ui.text(found.origin.name, size=15, bold=True)
-        ui.dim(what)
-        ui.dim(_shortened(str(found.file), right - across - ui.px(16)))
+        imgui.push_font(ui.fonts.bold, 15)
+        name = _shortened(found.origin.name, room, from_start=True)
+        imgui.pop_font()
+        ui.text(name, size=15, bold=True)
+        ui.dim(_shortened(what, room, from_start=True))
+        ui.dim(_shortened(str(found.file), room))
         imgui.end_group()
         imgui.set_cursor_pos(ImVec2(right - across, top + ui.px(2 if is_narrow else 14)))
         discard = ui.button("Really?" if found is self._doubted else "Discard", width=100)
@@ -165,10 +169,10 @@ def _moment(when: datetime, today: date) -> str:
     return f"{day} at {when:%H:%M}"
 
 
-def _shortened(text: str, width: float) -> str:
-    """The end of it, as much as there is room for."""
+def _shortened(text: str, width: float, from_start: bool = False) -> str:
+    """The end of it, or the start, as much as there is room for."""
     if imgui.calc_text_size(text).x <= width:
         return text
     while len(text) > 4 and imgui.calc_text_size(f"... {text}").x > width:
-        text = text[1:]
-    return f"... {text}"
+        text = text[:-1] if from_start else text[1:]
+    return f"{text} ..." if from_start else f"... {text}"

@@ -58,6 +58,7 @@ class Ui:
     Attributes:
         covers: where the canvas is covered by something that can be clicked, as of the last frame.
         covering: the same of the frame that is being drawn, as far as it is.
+        floating_over: what lies there and the pointer goes through, likewise.
         has_popup: a menu or a dialog is open, as of then.
         chord: the chord that the person has chosen for what another one does by default; "" if there is none.
     """
@@ -68,6 +69,7 @@ class Ui:
     density: float = 1.0
     covers: list[Rect] = field(default_factory=list)
     covering: list[Rect] = field(default_factory=list)
+    floating_over: list[Rect] = field(default_factory=list)
     has_popup: bool = False
     chord: Callable[[str], str] = str
     _slid: tuple[str, float] = ("", -1.0)  # the slider that was let go of last, and when
@@ -126,17 +128,31 @@ class Ui:
             yield
             if clicked:
                 self.cover()
+            else:
+                self.floating_over.append(self._window())
         finally:
             imgui.end()
 
     def cover(self) -> None:
         """Take note that the window being drawn lies on the canvas."""
+        self.covering.append(self._window())
+
+    def free_below(self, left: float, right: float, top: float) -> float:
+        """How far down from `top` something may begin that lies on the canvas from `left` to `right`: below all that
+        has been drawn there before.
+        """
+        for rect in sorted([*self.covering, *self.floating_over], key=lambda rect: rect.y):
+            if rect.y < top + self.px(12) and rect.x < right and rect.right > left:
+                top = max(top, rect.bottom + self.px(8))
+        return top
+
+    def _window(self) -> Rect:
         place, size = imgui.get_window_pos(), imgui.get_window_size()
-        self.covering.append(Rect(place.x, place.y, size.x, size.y))
+        return Rect(place.x, place.y, size.x, size.y)
 
     def end_frame(self) -> None:
         """Everything has been drawn: what covers the canvas is known."""
-        self.covers, self.covering = self.covering, []
+        self.covers, self.covering, self.floating_over = self.covering, [], []
         self.has_popup = imgui.is_popup_open("", ANYWHERE)
 
     def is_covered(self, x: float, y: float) -> bool:

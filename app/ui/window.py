@@ -148,6 +148,7 @@ class GlfwWindow:
         last = time.perf_counter()
         editor.commands.clipboard = lambda text: glfw.set_clipboard_string(self.handle, text)
         editor.chooser.native = True
+        editor.rehearsal.has_news = self._has_news
         screen = self.device.ctx.detect_framebuffer(0)
         while not editor.commands.closed:
             self._wait(editor)
@@ -189,6 +190,13 @@ class GlfwWindow:
             if left <= 0:
                 return
             glfw.wait_events_timeout(min(left, 1.0))
+
+    def _has_news(self) -> bool:
+        """Something has been pressed, or let go, since the frame that is being drawn began."""
+        glfw.poll_events()
+        return any(
+            not (isinstance(event, (Move, Focus)) or (isinstance(event, Key) and event.repeat)) for event in self.events
+        )
 
     def _listen(self) -> None:
         handle = self.handle

@@ -93,6 +93,11 @@ class Work:
         return self.entries[self.index].recipe
 
     @property
+    def edits(self) -> tuple[int, int, int]:
+        """What every edit, undo and redo makes another, and the fluid's coming to rest does not."""
+        return len(self.entries), self.index, self.entries[self.index].number
+
+    @property
     def strokes(self) -> int:
         """How many strokes there are, with those that have been undone."""
         recipes = [entry.recipe for entry in self.entries[self.index :]]

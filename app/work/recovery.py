@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import stat
 import tempfile
 import threading
 from contextlib import suppress
@@ -23,6 +24,7 @@ from app.work.journal import Damaged, Newer, Origin, Work, beginning, continuati
 from app.work.locks import Lock
 
 JOURNAL = "work.journal"
+NEW = f"{JOURNAL}.new"  # until it is whole
 LOCK = "lock"
 SLACK = 4 * 2**20  # bytes that a journal may grow before it is begun anew; and as many again as it began with
 HANDING = 0.1  # seconds that a frame in which a stroke ends may wait for the journal: mostly it is less than one tick
@@ -66,10 +68,14 @@ class LockedFolder:
 
     def discard(self) -> None:
         """Remove it; what is left of it if that fails half-way is no journal any more."""
-        with suppress(OSError):
-            (self.folder / JOURNAL).unlink(missing_ok=True)
+        for name in (JOURNAL, NEW):
+            with suppress(OSError):
+                (self.folder / name).unlink()
         self.lock.release()
-        shutil.rmtree(self.folder, ignore_errors=True)
+        # What anybody else has put there stays there.
+        with suppress(OSError):
+            (self.folder / LOCK).unlink()
+            self.folder.rmdir()
 
 
 # -- writing ----------------------------------------------------------------------------------------------------------
@@ -113,11 +119,7 @@ class Journal:
         is_just_saved = bool(before) and before[0] is not project
         if is_just_saved or not work.is_unsaved:
             work = None
-        is_amended = (
-            work is not None
-            and self._wanted is not None
-            and (len(work.entries), work.index) == (len(self._wanted[1].entries), self._wanted[1].index)
-        )
+        is_amended = work is not None and self._wanted is not None and work.edits == self._wanted[1].edits
         if work is None and self._wanted is None and self._held is None:
             return
         with self._asking:
@@ -207,7 +209,7 @@ class Journal:
         if self._held is None:
             self._held = LockedFolder.new(self._root)
         folder = self._held.folder
-        path, temporary = folder / JOURNAL, folder / f"{JOURNAL}.new"
+        path, temporary = folder / JOURNAL, folder / NEW
         file = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | BINARY, 0o600)
         try:
             for line in beginning(Origin.of(project), work):
@@ -302,13 +304,18 @@ def find(root: Path) -> tuple[list[Found], list[str]]:
     """What was not saved and belongs to no fluidwarp that runs, the newest first; and sentences about what is left."""
     found, notices = [], []
     try:
-        folders = sorted(path for path in root.iterdir() if path.is_dir())
-    except OSError:
+        folders = sorted(path for path in root.iterdir() if path.is_dir() or path.is_symlink())
+    except (FileNotFoundError, NotADirectoryError):
         return [], []
+    except OSError as error:
+        return [], [_unread(root, error)]
     for folder in folders:
         try:
+            os.stat(folder)
             lock = Lock.take(folder / LOCK)
-        except OSError:
+        except OSError as error:
+            if folder.is_symlink() or os.path.lexists(folder / JOURNAL):
+                notices.append(_unread(folder, error))
             continue
         if lock is None:
             continue
@@ -320,7 +327,7 @@ def find(root: Path) -> tuple[list[Found], list[str]]:
         except Newer:
             notices.append(f"There is unsaved work of a newer fluidwarp, which alone can restore it: {folder}.")
         except OSError as error:
-            notices.append(f"The journal of unsaved work in {folder} cannot be read: {error.strerror}.")
+            notices.append(_unread(folder, error))
         else:
             if one is None:
                 held.discard()
@@ -331,11 +338,17 @@ def find(root: Path) -> tuple[list[Found], list[str]]:
     return sorted(found, key=lambda one: one.when, reverse=True), notices
 
 
+def _unread(folder: Path, error: OSError) -> str:
+    return f"The journal of unsaved work in {folder} cannot be read ({error.strerror}); it is left there."
+
+
 def _look_into(held: LockedFolder) -> Found | None:
     """What is in a folder; None where nothing would be lost with it."""
     path = held.folder / JOURNAL
-    if not path.is_file():
+    if not os.path.lexists(path):
         return None
+    if not stat.S_ISREG(path.stat().st_mode):  # a folder, or a pipe, for which one would wait for ever
+        raise Damaged
     origin, work = read(path.read_bytes())
     try:
         when = datetime.fromtimestamp(path.stat().st_mtime)

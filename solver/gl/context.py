@@ -7,7 +7,7 @@ import os
 import re
 import sys
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
@@ -84,6 +84,9 @@ class Context:
 
     Args:
         ctx: a moderngl context, GL 3.3 core or later; use `headless()` where there is no window.
+
+    Attributes:
+        watch: called before each pass, and may raise: what is being drawn is then given up, as a whole simulation.
     """
 
     _current: ClassVar[Context | None] = None  # whose context is
@@ -102,6 +105,7 @@ class Context:
             max_texture_units=int(info["GL_MAX_TEXTURE_IMAGE_UNITS"]),
         )
         self.timings = Timings(ctx)
+        self.watch: Callable[[], None] | None = None
         # Without threads of its own llvmpipe draws in ours, and no other holds a fence.
         has_threads = os.environ.get("LP_NUM_THREADS") != "0"
         self.fences = Fences(ctx, needed=has_threads and "llvmpipe" in self.limits.renderer.lower())

@@ -82,6 +82,8 @@ class Pass:
         """
         fields = (target,) if isinstance(target, Field) else tuple(target)
         device, size = self.device, fields[0].size
+        if device.watch is not None:
+            device.watch()
         regions = [(0, 0, *size)] if region is None else _clipped(region, size)
         if not regions:
             return

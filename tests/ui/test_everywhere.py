@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from datetime import datetime
+from fractions import Fraction
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
+from app.media.animation import animation_writer
 from app.model.bars import Which
 from app.model.handles import RecipeHandle, RecipePin
+from app.model.recipe import Recipe
 from app.model.strokes import Stroke, ToolName
 from app.model.tools import TOOLS
+from app.model.undo import Entry
 from app.ui.actions import ACTIONS
 from app.ui.browser import Browser
 from app.ui.dialogs import Dialog, PictureOrMap, Preferring, Unsaved
@@ -19,9 +26,12 @@ from app.ui.export_choices import KINDS
 from app.ui.export_dialog import ExportDialog
 from app.ui.key_sheet import KeySheet
 from app.ui.preferences import Preferences
+from app.ui.recovery_dialog import Offer
 from app.ui.saving import SaveDialog
+from app.work.journal import Origin, Work
+from app.work.recovery import Found
 from solver.gl.device import Device
-from support.editing import Robot, add_bars, small_project
+from support.editing import Robot, add_bars, pattern, small_project
 from support.laid import Laid
 
 SIZES = ((800, 520), (1280, 800), (3840, 2160))
@@ -144,7 +154,72 @@ def ended(robot: Robot, dialog: Dialog) -> Iterator[str]:
     robot.frame(count=2)
 
 
-TOURS = (tools, time, over)
+class Still:
+    """A process that is at work, and gets no further."""
+
+    part, state, is_done = 0.3, "looking where the handles were set, 98 % of them are where they should be", False
+
+    def __init__(self, work: Any) -> None:
+        self.job = self.fit = work
+
+    def poll(self) -> None: ...
+    def finish(self) -> None: ...
+    def stop(self, then: object = None) -> None: ...
+
+
+def work(robot: Robot, places: object) -> Iterator[str]:
+    """What is found at the start, a clip, and what goes on in other processes; in the light theme."""
+    editor, folder = robot.editor, robot.editor.session.project.folder
+    editor.preferences.theme = "light"
+    recipe = Recipe(stroke=(Stroke(tool="push", samples=((0, 0.3, 0.5, 1.0),)),), pin=(RecipePin(at=(0.7, 0.3)),))
+    entries = (Entry("Open", Recipe(), 0), Entry("Push", recipe, 0))
+    origin = Origin("a picture with a long name, and more than that", str(folder), None, False, False, 0, 0)
+    held: Any = None  # which nobody lets go of
+    found = [Found(held, origin, Work(entries, 1, Recipe()), datetime(2024, 12, 24, 20)) for _ in range(6)]
+    source: Any = SimpleNamespace(offered=found, later=found.clear)
+    for count in (6, 1):
+        del found[count:]
+        editor.dialogs.show(offer := Offer(source))
+        yield f"{count} works to restore"
+        offer.close()
+        robot.frame(count=2)
+    with animation_writer(folder / "clip.apng", Fraction(5)) as write:
+        for _ in range(3):
+            write(pattern(96, 64).pixels)
+    robot.drop(folder / "clip.apng")
+    assert editor.session.project.clip is not None
+    yield "a clip"
+    robot.key("ctrl+e")
+    asked = editor.dialogs.shown[-1]
+    assert isinstance(asked, ExportDialog)
+    asked.choices.kind = 1
+    yield "export of a clip"
+    asked.close()
+    led = RecipeHandle(at=(0.4, 0.5), to=(0.5, 0.45), duration=0.1)
+    editor.session.edit("A handle", handle=(led,), duration=0.5)
+    editor.session.settle()
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("app.ui.export_dialog.ExportProcess", Still)
+        patched.setattr("app.ui.fitting.FitProcess", Still)
+        editor.fits.start()
+        yield "a fit under way"
+        job: Any = SimpleNamespace(target=Path("a picture with a long name warped.png"), check=lambda: None)
+        editor.exports.start(job)
+        yield "an export as well"
+    editor.messages.caution(
+        "Handle 1 is 69.5 pixels away from where it is led: the picture is bent as far as it bears."
+    )
+    yield "a message as well"
+    editor.fits.give_up()
+    editor.session.seek(0)
+    editor.session.replay.seek(0)
+    editor.session.seek(editor.session.end)
+    yield "a message, and an export"
+    editor.exports.cancel()
+    yield "a message"
+
+
+TOURS = (tools, time, over, work)
 
 
 @pytest.mark.parametrize("tour", TOURS, ids=lambda tour: tour.__name__)

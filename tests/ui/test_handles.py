@@ -398,3 +398,29 @@ def test_a_line_whose_places_have_goals_of_their_own_tells_why_it_has_no_rotate(
         told.clear()
         robot.frame()
         assert any("No Rotate" in text for text in told) == tells
+
+
+def test_a_handle_that_holds_back_a_stroke_is_told_of_once(robot: Robot) -> None:
+    def told() -> list[str]:
+        return [message.text for message in robot.editor.messages.shown if "holds its place" in message.text]
+
+    robot.key("g")
+    robot.click(*robot.at(0.5, 0.5))
+    robot.rest()
+    robot.key("f")
+    robot.drag((0.45, 0.5), (0.55, 0.5))  # which moves nothing
+    robot.key("ctrl+z")
+    robot.key("p")
+    robot.editor.state.brush = replace(robot.editor.state.brush, radius=0.08)
+    robot.drag((0.1, 0.1), (0.2, 0.1))
+    robot.rest()
+    assert told() == []
+    robot.drag((0.4, 0.5), (0.55, 0.5))
+    robot.rest()
+    (said,) = told()
+    assert said.startswith("Handle 1 holds its place") or said.startswith("Pin 1 holds its place")
+    robot.editor.messages.shown.clear()
+    robot.drag((0.4, 0.5), (0.55, 0.5))
+    robot.key("ctrl+z")
+    robot.rest()
+    assert told() == []

@@ -145,6 +145,22 @@ def files_in(root: Path) -> list[str]:
 # The journal of one work ---------------------------------------------------------------------------------------------
 
 
+def test_a_stroke_for_which_the_oldest_one_goes_waits_for_no_pause(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+    """There are no more of them than before, as while the fluid comes to rest."""
+    desk.push()
+    history = desk.document.history
+    desk.push()
+    desk.write()
+    history.budget = history.nbytes + history.entries[-1].nbytes - 1
+    count = len(history.entries)
+    monkeypatch.setattr(recovery, "PAUSE", 1e3)
+    desk.push()
+    assert len(history.entries) == count
+    desk.write()
+    desk.die()
+    assert is_all_of(found_in(desk.root), desk.document)
+
+
 def test_what_was_not_saved_is_found(desk: Desk) -> None:
     desk.push(3)
     desk.document.history.undo()
@@ -401,6 +417,36 @@ def test_what_cannot_be_read_is_left_alone_with_a_sentence(desk: Desk, data: byt
     assert words in notices[0]
     assert str(file.parent) in notices[0]
     assert file.read_bytes() == data
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="links and pipes are made otherwise there")
+@pytest.mark.parametrize("what", ["folder", "link", "pipe"])
+@pytest.mark.parametrize("place", [recovery.JOURNAL, "lock", ".", ".."])
+def test_what_is_no_file_is_told_in_a_sentence_and_nothing_of_it_is_removed(desk: Desk, what: str, place: str) -> None:
+    desk.push()
+    desk.die()
+    folder = next(desk.root.rglob(recovery.JOURNAL)).parent
+    path = Path(os.path.normpath(folder / place))
+    path.rename(kept := desk.root.parent / "kept")
+    if what == "link":
+        path.symlink_to(path.name)
+    elif what == "folder" or place == ".":
+        path.mkdir()
+        (path / "inside").write_text("of somebody")
+    else:
+        os.mkfifo(path)
+    before = sorted(path.rglob("*"))
+    found, notices = find(desk.root)
+    for one in found:
+        one.leave()
+    assert found == [] or (place, what) == ("lock", "pipe")  # which can be locked as any file
+    is_foreign = what != "link" and place in (".", "..")
+    assert len(notices) == (not found and not is_foreign)
+    assert all(" (" in notice or place == recovery.JOURNAL for notice in notices)
+    assert all("left there" in notice and str(desk.root) in notice for notice in notices)
+    assert os.path.lexists(path)
+    assert sorted(path.rglob("*")) == before
+    assert kept.exists()
 
 
 @pytest.mark.parametrize("is_project", [False, True])

@@ -39,7 +39,7 @@ def draw(
 ) -> None:
     """Everything that floats over the canvas; `is_covered`: what is under way is told where hints stand."""
     session, canvas = workspace.session, workspace.view.canvas
-    if canvas.width > ui.px(ZOOM):
+    if canvas.width > ui.px(ZOOM) and not (is_covered and canvas.height <= ui.px(LOW)):
         _zoom(ui, workspace, do)
     how = selecting.hint
     if state.tool_name == "handle" and not session.recipe.leads:

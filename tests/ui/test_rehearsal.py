@@ -1,0 +1,65 @@
+"""What is compiled before the hand needs it: a press interrupts it, strokes wait for it, and nothing else changes."""
+
+from __future__ import annotations
+
+from app.ui.rehearsal import PARTS
+from support.editing import Robot
+
+
+def nothing() -> bool:
+    return False
+
+
+def test_it_ends_by_itself_and_leaves_the_work_as_it_is(robot: Robot) -> None:
+    rehearsal, session = robot.editor.rehearsal, robot.editor.session
+    assert not rehearsal.is_wanted  # without a window nobody presses anything
+    rehearsal.has_news = nothing
+    steps, recipe = session.replay.steps, session.recipe
+    assert robot.editor.wants_frame()
+    robot.until(lambda: not rehearsal.is_wanted)
+    robot.frame(count=10)
+    assert not robot.editor.wants_frame()
+    assert (session.replay.steps, session.recipe, session.is_moving) == (steps, recipe, False)
+    assert robot.device.watch is None
+
+
+def test_a_press_interrupts_it_before_the_next_pass(robot: Robot) -> None:
+    rehearsal, asked = robot.editor.rehearsal, list[int]()
+
+    def pressed() -> bool:
+        asked.append(robot.device.timings.passes["other"])
+        return len(asked) % 7 == 0  # seven passes of one tick at most
+
+    rehearsal.has_news = pressed
+    robot.frame(count=3)
+    assert len(asked) == 21
+    assert rehearsal.is_wanted
+    assert robot.device.watch is None
+    rehearsal.has_news = nothing
+    robot.until(lambda: not rehearsal.is_wanted)
+
+
+def test_a_stroke_that_is_drawn_before_it_waits_and_is_in_the_history_at_once(robot: Robot) -> None:
+    rehearsal, session = robot.editor.rehearsal, robot.editor.session
+    rehearsal.has_news = lambda: True
+    robot.drag((0.3, 0.5), (0.5, 0.5))
+    assert session.document.recipe.stroke
+    assert rehearsal.is_needed
+    assert session.replay.steps == 0
+    rehearsal.has_news = nothing
+    robot.until(lambda: not session.is_moving)
+    assert session.replay.steps > 0
+    assert not rehearsal.is_needed
+    assert rehearsal.is_wanted  # the rest of it, of which the stroke needs nothing
+
+
+def test_the_parts_do_what_they_are_for(robot: Robot) -> None:
+    """Else they compile nothing: a part whose recipe is refused, or moves nothing, would be silent."""
+    rehearsal, moved = robot.editor.rehearsal, list[float]()
+    rehearsal.has_news = nothing
+    while rehearsal.is_wanted:
+        robot.frame()
+        if rehearsal.trial is not None:
+            moved.append(float(abs(rehearsal.trial.warp.read()).max()))
+    assert len(moved) == 4 * len(PARTS)
+    assert min(moved[3::4]) > 0.01
