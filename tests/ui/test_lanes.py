@@ -142,6 +142,20 @@ def test_a_bar_is_stretched_at_its_ends(painted: Robot) -> None:
     assert recipe(painted).stroke[1].last_tick == recipe(painted).stroke[1].first_tick
 
 
+def test_where_some_of_the_selected_bars_are_muted_all_are_muted_first(painted: Robot) -> None:
+    session, whole = painted.editor.session, {("stroke", 0), ("stroke", 1)}
+    for number in (0, 1):
+        lanes(painted).selected = {("stroke", number)}
+        lanes(painted).mute(session)
+        assert [stroke.muted for stroke in recipe(painted).stroke] == [number == 0, number == 1]
+        lanes(painted).selected = set[Which](whole)
+        assert not lanes(painted).is_muted(session)
+        lanes(painted).mute(session)
+        assert all(stroke.muted for stroke in recipe(painted).stroke)
+        lanes(painted).mute(session)
+        assert not any(stroke.muted for stroke in recipe(painted).stroke)
+
+
 def test_bars_that_are_selected_start_together_and_are_muted_and_deleted(painted: Robot) -> None:
     before = recipe(painted)
     first, second = (place(painted, number).middle for number in (0, 1))
