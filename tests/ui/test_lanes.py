@@ -492,6 +492,30 @@ def test_the_wheel_with_ctrl_shows_less_of_time_and_all_of_it_again(painted: Rob
     assert lanes(painted).view is None
 
 
+def test_the_wheel_with_shift_goes_back_in_time_and_forth_again_as_far_as_there_is_some(painted: Robot) -> None:
+    painted.move(*place(painted, 1).middle)
+    state, length = lanes(painted), painted.editor.session.length
+    state.view = (0.4 * length, 0.6 * length)
+    painted.mods = Mods(shift=True)
+    painted.hold("shift", True)
+
+    def turned(notches: int) -> float:
+        """Where what is shown begins, as a part of all."""
+        for _ in range(abs(notches)):
+            painted.wheel(notches // abs(notches))
+        painted.frame(count=2)
+        start, stop = state.span(length)
+        assert stop - start == pytest.approx(0.2 * length)
+        return start / length
+
+    assert turned(1) == pytest.approx(0.38)
+    assert turned(-2) == pytest.approx(0.42)
+    last = turned(-40)
+    assert last >= 0.8
+    assert turned(-1) == last
+    assert turned(50) == 0
+
+
 @pytest.mark.parametrize("size", [(1280, 800), (800, 520), (400, 260)])
 @pytest.mark.parametrize("inspector", [True, False])
 def test_the_lanes_lie_between_the_picture_and_the_timeline(
