@@ -143,12 +143,12 @@ def test_a_bar_is_stretched_at_its_ends(painted: Robot) -> None:
 
 
 def test_where_some_of_the_selected_bars_are_muted_all_are_muted_first(painted: Robot) -> None:
-    session, whole = painted.editor.session, {("stroke", 0), ("stroke", 1)}
-    for number in (0, 1):
-        lanes(painted).selected = {("stroke", number)}
+    session, both = painted.editor.session, list[Which]([("stroke", 0), ("stroke", 1)])
+    for number, which in enumerate(both):
+        lanes(painted).selected = {which}
         lanes(painted).mute(session)
         assert [stroke.muted for stroke in recipe(painted).stroke] == [number == 0, number == 1]
-        lanes(painted).selected = set[Which](whole)
+        lanes(painted).selected = set(both)
         assert not lanes(painted).is_muted(session)
         lanes(painted).mute(session)
         assert all(stroke.muted for stroke in recipe(painted).stroke)
