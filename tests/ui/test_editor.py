@@ -846,12 +846,16 @@ def test_without_a_system_s_file_dialog_there_is_ours(
         monkeypatch.setenv("PATH", str(programs))
     else:
         answer = f"echo {tmp_path}/other.png" if helper == "working" else "exit 1"
-        (programs / "zenity").write_text(f"#!/bin/sh\nsleep 0.1\n{answer}\n")
+        told = programs / "told.txt"
+        (programs / "zenity").write_text(f'#!/bin/sh\nsleep 0.1\necho "$@" > {told}\n{answer}\n')
         (programs / "zenity").chmod(0o755)
         monkeypatch.setenv("PATH", f"{programs}:{os.environ['PATH']}")
     robot.editor.chooser.native = True
     robot.key("ctrl+o")
     robot.until(lambda: not robot.editor.chooser.is_waiting)
+    if helper != "absent":
+        patterns = (programs / "told.txt").read_text().split("|")[1].split()
+        assert {"*.png", "*.fluidwarp", "*.mp4"} <= set(patterns)
     if helper == "working":
         robot.until(lambda: not robot.editor.files.is_loading)
     else:

@@ -142,6 +142,20 @@ def test_a_bar_is_stretched_at_its_ends(painted: Robot) -> None:
     assert recipe(painted).stroke[1].last_tick == recipe(painted).stroke[1].first_tick
 
 
+def test_where_some_of_the_selected_bars_are_muted_all_are_muted_first(painted: Robot) -> None:
+    session, both = painted.editor.session, list[Which]([("stroke", 0), ("stroke", 1)])
+    for number, which in enumerate(both):
+        lanes(painted).selected = {which}
+        lanes(painted).mute(session)
+        assert [stroke.muted for stroke in recipe(painted).stroke] == [number == 0, number == 1]
+        lanes(painted).selected = set(both)
+        assert not lanes(painted).is_muted(session)
+        lanes(painted).mute(session)
+        assert all(stroke.muted for stroke in recipe(painted).stroke)
+        lanes(painted).mute(session)
+        assert not any(stroke.muted for stroke in recipe(painted).stroke)
+
+
 def test_bars_that_are_selected_start_together_and_are_muted_and_deleted(painted: Robot) -> None:
     before = recipe(painted)
     first, second = (place(painted, number).middle for number in (0, 1))
@@ -476,6 +490,30 @@ def test_the_wheel_with_ctrl_shows_less_of_time_and_all_of_it_again(painted: Rob
         painted.wheel(-1)
     painted.frame(count=2)
     assert lanes(painted).view is None
+
+
+def test_the_wheel_with_shift_goes_back_in_time_and_forth_again_as_far_as_there_is_some(painted: Robot) -> None:
+    painted.move(*place(painted, 1).middle)
+    state, length = lanes(painted), painted.editor.session.length
+    state.view = (0.4 * length, 0.6 * length)
+    painted.mods = Mods(shift=True)
+    painted.hold("shift", True)
+
+    def turned(notches: int) -> float:
+        """Where what is shown begins, as a part of all."""
+        for _ in range(abs(notches)):
+            painted.wheel(notches // abs(notches))
+        painted.frame(count=2)
+        start, stop = state.span(length)
+        assert stop - start == pytest.approx(0.2 * length)
+        return start / length
+
+    assert turned(1) == pytest.approx(0.38)
+    assert turned(-2) == pytest.approx(0.42)
+    last = turned(-40)
+    assert last >= 0.8
+    assert turned(-1) == last
+    assert turned(50) == 0
 
 
 @pytest.mark.parametrize("size", [(1280, 800), (800, 520), (400, 260)])

@@ -293,6 +293,20 @@ def test_frames_are_kept_where_that_is_asked_for_only(device: Device, picture: P
         assert progress.done == progress.total == made
 
 
+@pytest.mark.parametrize("part", [(0, None), (2, 5), (8, None), (0, 0)])
+def test_of_a_part_as_many_frames_are_promised_as_are_made(
+    device: Device, clip: Path, tmp_path: Path, part: tuple[int, int | None]
+) -> None:
+    """And each is counted as often as its format goes through it."""
+    write_map(tmp_path / "m.npy", Displacement(np.zeros((HEIGHT, WIDTH, 2), np.float32)))
+    made = (9 if part[1] is None else part[1] + 1) - part[0]
+    for name, passes in (("f.%d.png", 1), ("f.gif", 2)):
+        order, progress = applied(tmp_path / "m.npy", clip, tmp_path / name), Progress()
+        order = replace(order, outputs=replace(order.outputs, part=part))
+        assert order.perform(lambda: device, progress).frames == made
+        assert progress.done == progress.total == made * passes
+
+
 def test_a_map_for_every_frame(device: Device, picture: Path, tmp_path: Path):
     """The picture through map k is frame k; converted, they are the same maps."""
     render(device, WHIRL, picture, tmp_path / "f.%03d.png", maps=MapOutput(tmp_path / "m.%03d.exr", overscan=3))

@@ -283,6 +283,13 @@ def test_maps_and_frames_go_together_by_their_numbers(folder: Path, fluidwarp: R
     assert "it lacks the frame 1002" in ran.stderr
 
 
+def test_of_a_sequence_of_one_file_nothing_is_left_out(tmp_path: Path) -> None:
+    for count in (1, 2):
+        write_picture(tmp_path / f"a.{count}.png", Picture(np.zeros((4, 4, 3), np.uint8)))
+        note = open_source(tmp_path / "a.%d.png", animated=False).picture.note
+        assert ("only the first is used" in note) == (count > 1)
+
+
 def test_apply_goes_on(folder: Path, fluidwarp: Run):
     write_map(folder / "m.npy", Displacement(np.full((HEIGHT, WIDTH, 2), 0.05, np.float32)))
     words = ["apply", "m.npy", "plate.%04d.exr", "-o", "w.%04d.exr"]

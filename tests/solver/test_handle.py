@@ -1,0 +1,66 @@
+"""Where a handle shall be at each moment, without a fluid."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from solver.brush.handle import Handle
+
+DT = 0.02
+TIMES = np.linspace(0, 4, 401)
+KEYS = ((1.5, 0.4, 0.7), (1.9, 0.6, 0.2), (3.0, 0.3, 0.5))
+
+
+def way(handle: Handle) -> np.ndarray:
+    """Where it shall be at `TIMES`, (n, 2)."""
+    return np.array([handle.wanted(np.array(handle.at), time, DT, math.inf) for time in TIMES.tolist()])
+
+
+def test_after_its_first_way_a_handle_goes_from_key_to_key_at_an_even_speed() -> None:
+    handle = Handle((0.5, 0.5), (0.7, 0.6), start=0.2, duration=0.8, keys=KEYS)
+    times, places = [1.0, *(key[0] for key in KEYS)], np.array([(0.7, 0.6), *(key[1:] for key in KEYS)])
+    after = TIMES >= 1.0
+    for axis in (0, 1):
+        wanted = np.interp(TIMES[after], times, places[:, axis])
+        assert way(handle)[after, axis] == pytest.approx(wanted, abs=1e-12)
+
+
+@pytest.mark.parametrize("keys", [(), KEYS])
+def test_the_first_way_begins_and_ends_softly_and_is_the_same_whatever_comes_after(keys: tuple) -> None:
+    handle = Handle((0.5, 0.5), (0.7, 0.6), start=0.2, duration=0.8, keys=keys)
+    at = way(handle)[TIMES <= 1.0]
+    assert (at[TIMES[: len(at)] <= 0.2] == 0.5).all()
+    parts = (at[20:] - 0.5) / [0.2, 0.1]
+    assert parts[:, 0] == pytest.approx(parts[:, 1], abs=1e-12)
+    assert parts[:, 0] + parts[::-1, 0] == pytest.approx(np.ones(len(parts)), abs=1e-9), "as it begins it ends"
+    speed = np.diff(parts[:, 0])
+    assert (speed > 0).all()
+    assert max(speed[0], speed[-1]) < 0.1 * speed.max()
+
+
+def test_after_its_first_turn_a_handle_turns_evenly_and_grows_by_even_factors() -> None:
+    turned = ((1.5, 90.0, 2.0), (2.0, -30.0, 0.5), (3.0, 0.0, 1.0))
+    handle = Handle((0.5, 0.5), start=0.2, duration=0.8, rotate=45.0, scale=1.5, turned=turned)
+    after = TIMES >= 1.0
+    angles, scales = np.array([handle.turn(time, DT) for time in TIMES[after].tolist()]).T
+    times, rows = [1.0, *(key[0] for key in turned)], np.array([(45.0, 1.5), *(key[1:] for key in turned)])
+    assert np.degrees(angles) == pytest.approx(np.interp(TIMES[after], times, rows[:, 0]), abs=1e-9)
+    assert np.log(scales) == pytest.approx(np.interp(TIMES[after], times, np.log(rows[:, 1])), abs=1e-9)
+
+
+def test_a_handle_that_goes_nowhere_stays_where_it_was_when_it_began() -> None:
+    handle = Handle((0.5, 0.5), start=0.2)
+    began = np.array((0.52, 0.47))
+    assert all((handle.wanted(began, time, DT) == began).all() for time in TIMES.tolist())
+
+
+def test_a_handle_goes_no_farther_than_so_many_radii() -> None:
+    handle = Handle((0.5, 0.5), (0.9, 0.8), radius=0.1, duration=1.0, keys=((2.0, 0.1, 0.2), (3.0, 0.5, 0.6)))
+    for time, place in ((1.0, (0.9, 0.8)), (2.0, (0.1, 0.2)), (3.0, (0.5, 0.6))):
+        way = np.array(place) - 0.5
+        far = np.hypot(*way)
+        wanted = 0.5 + way * min(1.0, 0.2 / far)
+        assert handle.wanted(np.array((0.5, 0.5)), time, DT, 2.0) == pytest.approx(wanted, abs=1e-12)
