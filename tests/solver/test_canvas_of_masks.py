@@ -93,14 +93,18 @@ def test_the_ring_is_what_is_frozen(hardness: float, device: Device, masks: Mask
     assert thawed.sum() * CANVAS.h**2 == pytest.approx(np.pi * 0.05**2, rel=0.01)
 
 
-def test_a_weak_brush_freezes_in_time(masks: Masks) -> None:
-    tip = Tip((0.5, 0.3), (0.5, 0.3), 0.05)
+def test_a_weak_brush_freezes_in_time(masks: Masks, device: Device) -> None:
+    """From half frozen on: before that it closes no cell either."""
+    tip, grid = Tip((0.5, 0.3), (0.5, 0.3), 0.05), Grid(60, 40)
     for _ in range(5):
         masks.freeze(tip, 0.1)
     assert not (masks.frozen.get() >= 128).any()
+    assert masks.frozen.get().max() > 64
+    assert not told(masks, device, grid)[1].any()
     for _ in range(5):
         masks.freeze(tip, 0.1)
     assert (masks.frozen.get() >= 128).any()
+    assert told(masks, device, grid)[1].any()
 
 
 def test_thickness_is_painted_with_the_brush_s_falloff_within_its_limits(masks: Masks) -> None:

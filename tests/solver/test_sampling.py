@@ -83,6 +83,24 @@ def test_bilinear_agrees_with_opencv(device: Device, size: tuple[int, int]) -> N
     assert np.abs(found - wanted).max() <= 1.0
 
 
+@pytest.mark.parametrize("channels", [1, 3, 4])
+@pytest.mark.parametrize("kind", KINDS)
+def test_bilinear_is_so_in_both_directions(device: Device, kind: str, channels: int) -> None:
+    """Not half way, so that no weight is another one; in light, against float64."""
+    dtype, top = KINDS[kind]
+    values = np.random.default_rng(8).random((30, 44, channels))
+    values[..., 3:] = 1.0
+    picture = (np.round(values * top) if top > 1 else values).astype(dtype)
+    light = picture / top if kind == "float" else srgb_to_linear(picture / top)
+    right, down = 0.3, 0.2
+    rows = (1 - right) * light[:, :-1] + right * light[:, 1:]
+    wanted = (1 - down) * rows[:-1] + down * rows[1:]
+    wanted = wanted if kind == "float" else linear_to_srgb(wanted)
+    how = Sampling("bilinear", "clamp", samples=1, dither=False)
+    found = Sampler(device).apply(GivenMap(device, shift((44, 30), right, down)), picture, how=how)[:-1, :-1] / top
+    np.testing.assert_allclose(found, wanted, atol=1.1 / top if kind == "8" else 1e-4)
+
+
 @pytest.mark.parametrize("edges", ["transparent", "black", "clamp", "mirror", "wrap"])
 def test_tiles_are_the_same_to_the_bit(device: Device, edges: str) -> None:
     warp = GivenMap(device, waves((230, 150), 0.2))

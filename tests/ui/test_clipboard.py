@@ -6,6 +6,7 @@ import io
 import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,8 @@ from PIL import Image
 from app.media import project as projects
 from app.media.pictures import read_picture, write_picture
 from app.ui import clipboard
+from app.ui.preferences import Preferences
+from app.ui.saving import SaveDialog
 from solver.gl.device import Device
 from support.commands import Run
 from support.desk import Desk, needs_a_screen
@@ -113,3 +116,18 @@ def test_only_the_newest_pasted_pictures_are_kept(tmp_path: Path) -> None:
         (tmp_path / name).touch()
     clipboard.prune(tmp_path)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["own.png", *names[3:]]
+
+
+def test_a_pasted_picture_goes_into_its_project(robot: Robot, tmp_path: Path) -> None:
+    """Its own file is only kept until others have been pasted."""
+
+    def dialog(folder: Path) -> SaveDialog:
+        project = replace(robot.editor.session.project, folder=folder, keeper=None)
+        chooser = robot.editor.chooser
+        return SaveDialog(
+            project, tmp_path / "a.fluidwarp", Preferences(embed=False), chooser, robot.editor.files.write, None
+        )
+
+    pasted, other = dialog(clipboard.pasted_folder()), dialog(tmp_path)
+    assert (pasted.must_embed, pasted.embed) == (True, True)
+    assert (other.must_embed, other.embed) == (False, False)
