@@ -15,6 +15,7 @@ from support.editing import pattern
 
 DT = 1 / 60
 MOST_TICKS = 96
+FEELS = [(0.001, 0.0), (0.01, 0.5), (0.1, 3.0), (1.0, 12.0)]  # viscosity, drag
 
 
 def _place(rng: np.random.Generator, margin: float = 0.03) -> list[float]:
@@ -77,7 +78,7 @@ def random_recipe(rng: np.random.Generator) -> dict[str, Any]:
     """One to six handles among pins, thick and frozen places, pushes and a vortex."""
     ticks = int(rng.integers(24, MOST_TICKS))
     seconds = ticks * DT
-    viscosity, drag = [(0.001, 0.0), (0.01, 0.5), (0.1, 3.0), (1.0, 12.0)][int(rng.integers(4))]
+    viscosity, drag = FEELS[int(rng.integers(len(FEELS)))]
     recipe: dict[str, Any] = {
         "version": 5,
         "duration": round(seconds, 4),
@@ -138,13 +139,50 @@ def scene(seed: int) -> tuple[dict[str, Any], tuple[int, int]]:
     return recipe, [(texels, texels), (texels, 3 * texels // 4), (3 * texels // 4, texels)][int(rng.integers(3))]
 
 
+def beside_frozen(seed: int) -> dict[str, Any]:
+    """One or two handles beside a disc at the picture's edge that is frozen and smaller than a cell."""
+    rng = np.random.default_rng(seed)
+    viscosity, drag = FEELS[seed % len(FEELS)]
+    along, side, off = rng.uniform(0.2, 0.8), int(rng.integers(4)), rng.uniform(0, 0.02)
+    at = [[along, off], [along, 1 - off], [off, along], [1 - off, along]][side]
+    disc = {"tool": "freeze", "radius": float(rng.uniform(0.004, 0.02)), "hardness": 0.9, "samples": [[0, *at, 1.0]]}
+    handles = []
+    for _ in range(int(rng.integers(1, 3))):
+        place = np.clip(np.array(at) + rng.uniform(-0.12, 0.12, 2), 0.03, 0.97)
+        angle, radius = rng.uniform(0, 6.3), rng.uniform(0.06, 0.25)
+        way = radius * rng.uniform(0.3, 1.2) * np.array([np.cos(angle), np.sin(angle)])
+        ends = {"at": place.round(4).tolist(), "to": (place + way).round(4).tolist()}
+        handles.append(
+            {**ends, "radius": round(radius, 4), "duration": 0.3, "local": float(rng.choice([0, 0, 1, 0.5]))}
+        )
+    fluid = {"grid": 32, "dt": DT, "viscosity": viscosity, "drag": drag}
+    return {"version": 5, "duration": 0.6, "fluid": fluid, "stroke": [disc], "handle": handles}
+
+
+def check_handles_beside_frozen(device: Device, seed: int) -> dict[str, float]:
+    """No place folds beside a small frozen disc at the picture's edge, where nothing but handles moves anything."""
+    folds, least, first = played(device, beside_frozen(seed), (128, 128))
+    assert not folds, f"{folds} places fold, the first at tick {first}, least det J {least:.3f}"
+    return {"least det J, from 1": 1 - least}
+
+
+def _handles_only(recipe: dict[str, Any]) -> dict[str, Any]:
+    """What is thick and frozen stays; no other stroke and no force moves anything."""
+    kept = [stroke for stroke in recipe.get("stroke", []) if stroke["tool"] in ("thicken", "freeze")]
+    return {key: value for key, value in recipe.items() if key not in ("stroke", "force")} | {"stroke": kept}
+
+
 def check_handles_fold_nothing(device: Device, seed: int) -> dict[str, float]:
     """No place folds, unless it does without the handles, too."""
     recipe, size = scene(seed)
     folds, least, first = played(device, recipe, size)
     if folds:
         without = {key: value for key, value in recipe.items() if key not in ("handle", "pin")}
-        alone, _, _ = played(device, without, size)
-        assert alone, f"{folds} places fold, the first at tick {first}, least det J {least:.3f}"
+        alone, alone_least, _ = played(device, without, size)
+        told = f"{folds} places fold, the first at tick {first}, least det J {least:.3f}"
+        if not alone:  # whose fold it is: of the handles, of what else moves beside them, or of both
+            by_handles, by_handles_least, _ = played(device, _handles_only(recipe), size)
+            told += f"; without handles {alone_least:.3f}, by handles only {by_handles_least:.3f} ({by_handles} places)"
+            raise AssertionError(told)
         return {"folded without handles": 1.0}
     return {"least det J, from 1": 1 - least}
