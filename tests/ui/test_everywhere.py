@@ -234,6 +234,7 @@ def test_nothing_is_cut_off_or_over_something_else(
         for state in tour(robot, laid.places):  # pyright: ignore[reportCallIssue]
             robot.move(size[0] / 2, size[1] / 2)
             robot.frame(count=2)
-            for fault in laid.faults(robot.frame):
-                told.setdefault(fault, state)
+            if laid.faults(robot.frame):  # what has come in this frame is laid out in the next one
+                robot.frame(count=2)
+                told |= {fault: state for fault in laid.faults(robot.frame) if fault not in told}
     assert not told, "\n".join(f"{state}: {fault}" for fault, state in told.items())
