@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 from collections.abc import Sequence
@@ -59,7 +60,12 @@ cli = typer.Typer(
 
 def main() -> None:
     """Run the command line; what goes wrong ends in one message on stderr and a status that is not 0."""
+    for name in ("stdout", "stderr"):  # a daemon may have closed them
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115
     try:
+        if not _has_folder():
+            raise UserError("the folder that this runs in is gone; go to another one")
         if "" in sys.argv[1:]:
             raise UserError("one of the words of this command is empty; is a variable in it not set?")
         if sys.argv[1:] == ["--version"]:  # without pydantic, which typer loads for any option, and takes as long again
@@ -85,9 +91,21 @@ def main() -> None:
             _fail(_usage(error), 2)
         if os.environ.get("FLUIDWARP_TRACEBACK"):
             raise
+        if isinstance(error, OSError) and error.errno == errno.ENOSPC:  # what files cannot be written is told as that
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            _fail("what this prints cannot be written: the disk is full; free some space", 1)
         words = str(error).strip().splitlines()
         said = f": {words[0]}" if words else ""
         _fail(f"this is a bug in fluidwarp ({type(error).__name__}{said}); FLUIDWARP_TRACEBACK=1 shows where", 70)
+
+
+def _has_folder() -> bool:
+    """The folder that names start from is there."""
+    try:
+        os.getcwd()
+    except OSError:
+        return False
+    return True
 
 
 def _usage(error: Any) -> str:

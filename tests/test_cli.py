@@ -11,7 +11,7 @@ import time
 from collections.abc import Iterator
 from inspect import signature
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -686,3 +686,32 @@ def options() -> Iterator[str]:
 def test_every_word_of_the_command_line_takes_what_it_did():
     """Other programs call it: what changes here is told in the changelog."""
     assert [*options()] == (ROOT / "tests/golden/commands.txt").read_text("utf-8").splitlines()
+
+
+def test_where_standard_output_and_errors_are_closed_it_works_all_the_same(
+    tmp_path: Path, fluidwarp: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A daemon may have closed them."""
+    write_picture(tmp_path / "a.png", Picture(np.zeros((16, 24, 3), np.uint8)))
+    (tmp_path / "a.toml").write_text('version = 5\npicture = "a.png"\nduration = 0.05\nfluid.grid = 16\n')
+    for name in ("stdout", "stderr"):
+        monkeypatch.setattr(sys, name, None)
+    assert fluidwarp(tmp_path, "render", "a.toml", "-o", "b.png").returncode == 0
+    assert (tmp_path / "b.png").exists()
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no such device")
+def test_what_prints_into_a_full_disk_and_where_the_folder_is_gone_a_sentence_says_so(tmp_path: Path) -> None:
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+
+    def said(words: list[str], **named: Any) -> tuple[int, str]:
+        ran = subprocess.run(words, stderr=subprocess.PIPE, text=True, env=environment, **named)
+        return ran.returncode, ran.stderr
+
+    program = f"{sys.executable} -m app"
+    with open("/dev/full", "w") as full:
+        status, told = said([*program.split(), "doctor"], cwd=tmp_path, stdout=full)
+    assert (status, told) == (1, "fluidwarp: what this prints cannot be written: the disk is full; free some space\n")
+    gone = f"mkdir gone && cd gone && rmdir ../gone && exec {program} render a.toml -o b.png"
+    status, told = said(["sh", "-c", gone], cwd=tmp_path)
+    assert (status, told) == (1, "fluidwarp: the folder that this runs in is gone; go to another one\n")

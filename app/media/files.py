@@ -6,10 +6,11 @@ import errno
 import os
 import re
 import shutil
+import stat
 from collections.abc import Collection, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
-from itertools import groupby
+from itertools import pairwise, product
 from pathlib import Path
 
 from app.errors import UserError
@@ -162,14 +163,18 @@ def sequence_of(file: Path) -> Path:
 
 def check_numbers(pattern: str | os.PathLike[str], there: Collection[int], wanted: range) -> None:
     """Raise `UserError`, naming the numbers, if some of the `wanted` files of a sequence are not there."""
-    missing = [number for number in wanted if number not in there]
-    if not missing:
+    present = sorted(number for number in there if number in wanted)
+    count = max(wanted.stop - wanted.start, 0)
+    if len(present) == count:
         return
-    runs = [[number for _, number in run] for _, run in groupby(enumerate(missing), lambda at: at[1] - at[0])]
-    named = [f"{run[0]}-{run[-1]}" if len(run) > 1 else f"{run[0]}" for run in runs]
-    listed = ", ".join(named[:MOST_RUNS]) + (f" and others, {len(missing)} in all" if len(named) > MOST_RUNS else "")
-    wants = f"{wanted[0]}-{wanted[-1]}" if len(wanted) > 1 else f"{wanted[0]}"
-    frames = "frames" if len(missing) > 1 else "frame"
+    # A name may have any number: of what lies between two only the ends are looked at.
+    ends = pairwise([wanted.start - 1, *present, wanted.stop])
+    runs = [(before + 1, after - 1) for before, after in ends if after - before > 1]
+    named = [f"{first}-{last}" if first < last else f"{first}" for first, last in runs]
+    missing = count - len(present)
+    listed = ", ".join(named[:MOST_RUNS]) + (f" and others, {missing} in all" if len(named) > MOST_RUNS else "")
+    wants = f"{wanted.start}-{wanted.stop - 1}" if count > 1 else f"{wanted.start}"
+    frames = "frames" if missing > 1 else "frame"
     said = f"Cannot read {pattern}: of {wants} it lacks the {frames} {listed}"
     raise UserError(
         f"{said}; make them, or give --frames.", in_window=f"{said}; make them, or number the others without a gap."
@@ -190,8 +195,18 @@ def takes_place(output: str | os.PathLike[str], source: str | os.PathLike[str]) 
 
 def check_kept(source: str | os.PathLike[str], output: str | os.PathLike[str]) -> None:
     """Make sure that what is made of `source`, or about it, does not take its place. Raises `UserError`."""
-    if takes_place(os.path.realpath(output), os.path.realpath(source)):
+    if any(takes_place(place, kept) for place, kept in product(_real_places(output), _real_places(source))):
         raise UserError(f"{source} would be replaced by its own result; choose another name")
+
+
+def _real_places(path: str | os.PathLike[str]) -> list[str]:
+    """The real path of a file or of a sequence, and those of its files that are links to somewhere else."""
+    places = [os.path.realpath(path)]
+    if is_sequence(path):
+        with suppress(OSError):
+            links = (link for link in os.scandir(Path(path).parent) if link.is_symlink())
+            places += [os.path.realpath(link.path) for link in links if number_in(path, link.name) is not None]
+    return places
 
 
 def cannot_write(path: str | os.PathLike[str], error: OSError) -> UserError:
@@ -227,6 +242,8 @@ def replacing(path: str | os.PathLike[str], backup: Path | None = None) -> Itera
     try:
         with temporary_file(temporary_beside(target)) as temporary:
             yield temporary
+            if target.exists():  # who may read it stays as it was
+                os.chmod(temporary, stat.S_IMODE(target.stat().st_mode))
             if backup is not None:
                 sync(temporary)
                 if target.exists():

@@ -28,6 +28,7 @@ from app.model.schema import frozen, plain
 from app.model.undo import Entry, History
 
 VERSION = 1
+MOST_DIGITS = 9  # of a version: no number is made of more
 _HEAD = "fluidwarp journal"
 
 
@@ -206,7 +207,7 @@ def read(data: bytes) -> tuple[Origin, Work]:
     words = head.decode("ascii", "replace").rsplit(" ", 2)
     if len(words) != 3 or words[0] != _HEAD or not (words[1].isdecimal() and words[2].isdecimal()):
         raise Damaged
-    if int(words[1]) > VERSION or int(words[2]) > RECIPE_VERSION:
+    if max(map(len, words[1:])) > MOST_DIGITS or int(words[1]) > VERSION or int(words[2]) > RECIPE_VERSION:
         raise Newer
     origin: Origin | None = None
     work = Work((), 0, Recipe())

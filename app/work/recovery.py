@@ -194,7 +194,7 @@ class Journal:
             self._held.lock.release()
 
     def _write(self, project: Project, work: Work) -> None:
-        if self._file is not None and self._written is not None and self._size <= self._most:
+        if self._file is not None and self._written is not None and self._size <= self._most and self._is_there:
             before = self._written[1]
             if self._written[0] is project and before.saved is work.saved:
                 line = continuation(work, before)
@@ -203,9 +203,22 @@ class Journal:
                 return
         self._begin(project, work)
 
+    @property
+    def _is_there(self) -> bool:
+        """The file that is open still has its name: in one that was taken away nobody finds anything."""
+        if self._file is None or self._held is None:
+            return False
+        try:
+            return os.path.samestat(os.fstat(self._file), os.stat(self._held.folder / JOURNAL))
+        except OSError:
+            return False
+
     def _begin(self, project: Project, work: Work) -> None:
         """Write all of it into a new file, which takes the place of the one that is there."""
         self._close_file()
+        if self._held is not None and not self._held.folder.is_dir():
+            self._held.lock.release()
+            self._held = None
         if self._held is None:
             self._held = LockedFolder.new(self._root)
         folder = self._held.folder

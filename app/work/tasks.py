@@ -108,14 +108,14 @@ class Piece(ABC):
 
     def check_names(self, read: Sequence[Path]) -> None:
         """Raise `UserError` if two of its outputs are one file, or one of them is among the files `read`."""
-        seen: set[str] = set()
+        seen = list[str]()
         for path in self.outputs.files:
             for source in read:
                 check_kept(source, path)
             real = os.path.realpath(path)
-            if real in seen:
+            if any(takes_place(real, other) for other in seen):
                 raise UserError(f"{path} cannot hold two results; give --output, --map and --stats different names")
-            seen.add(real)
+            seen.append(real)
 
     @abstractmethod
     def perform(self, device: Callable[[], Device], progress: Progress) -> Report:

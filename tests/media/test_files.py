@@ -19,6 +19,7 @@ from app.media.files import (
     number_in,
     numbered,
     numbered_files,
+    replacing,
     takes_place,
     unnumbered,
 )
@@ -74,13 +75,15 @@ def test_files_are_in_the_order_of_their_numbers(tmp_path: Path) -> None:
         ([4], range(1, 8), "of 1-7 it lacks the frames 1-3, 5-7;"),
         (range(0, 17, 2), range(17), "the frames 1, 3, 5, 7, 9, 11, 13, 15;"),
         (range(0, 19, 2), range(19), "the frames 1, 3, 5, 7, 9, 11, 13, 15 and others, 9 in all;"),
+        ([1, 10**18], range(1, 10**18 + 1), "it lacks the frames 2-999999999999999999;"),
     ],
 )
 def test_missing_numbers_are_named_in_runs_eight_at_most(there: list[int], wanted: range, said: str) -> None:
     with pytest.raises(UserError) as raised:
         check_numbers("a.%d.png", there, wanted)
     assert said in str(raised.value)
-    check_numbers("a.%d.png", wanted, wanted)
+    if len(wanted) < 100:
+        check_numbers("a.%d.png", wanted, wanted)
 
 
 @pytest.mark.parametrize(
@@ -104,6 +107,29 @@ def test_a_result_is_not_written_over_its_source(tmp_path: Path) -> None:
     check_kept(tmp_path / "a.png", tmp_path / "b.png")
     with pytest.raises(UserError, match="would be replaced by its own result"):
         check_kept(tmp_path / "a.png", tmp_path / "x/../a.png")
+
+
+@pytest.mark.parametrize("is_output", [False, True])
+def test_nor_through_links_that_are_some_of_its_files(tmp_path: Path, is_output: bool) -> None:
+    """Frames are published so: links to where they really are."""
+    for name in ("links", "real"):
+        (tmp_path / name).mkdir()
+    (tmp_path / "real" / "a.0002.png").touch()
+    (tmp_path / "links" / "b.0002.png").symlink_to("../real/a.0002.png")
+    links, real, other = (tmp_path / name for name in ("links/b.%04d.png", "real/a.%04d.png", "real/c.%04d.png"))
+    check_kept(other, links)
+    check_kept(links, other)
+    with pytest.raises(UserError, match="would be replaced by its own result"):
+        check_kept(*((real, links) if is_output else (links, real)))
+
+
+def test_who_may_read_a_file_stays_so_when_it_is_replaced(tmp_path: Path) -> None:
+    (file := tmp_path / "a.png").touch(0o600)
+    file.chmod(0o640)
+    with replacing(file) as temporary:
+        temporary.write_bytes(b"new")
+    assert file.read_bytes() == b"new"
+    assert file.stat().st_mode & 0o777 == 0o640
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ import errno
 import gc
 import os
 import random
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -525,6 +526,22 @@ def test_a_folder_that_cannot_be_written_is_told_and_tried_again(desk: Desk) -> 
     desk.root.unlink()
     desk.push()
     desk.write()
+    desk.die()
+    assert is_all_of(found_in(desk.root), desk.document)
+
+
+@pytest.mark.parametrize("gone", ["the journal", "its folder", "all journals"])
+def test_a_journal_that_is_taken_away_is_begun_anew(desk: Desk, gone: str) -> None:
+    desk.push(2)
+    desk.write()
+    ((journal,),) = [list(desk.root.glob("*/work.journal"))]
+    if gone == "the journal":
+        journal.unlink()
+    else:
+        shutil.rmtree(journal.parent if gone == "its folder" else desk.root)
+    desk.push(2)
+    desk.write()
+    assert desk.journal.trouble is None
     desk.die()
     assert is_all_of(found_in(desk.root), desk.document)
 

@@ -136,6 +136,14 @@ def test_files_are_not_replaced_by_their_own_results(folder: Path, fluidwarp: Ru
         assert "would be replaced by its own result" in ran.stderr
 
 
+@pytest.mark.parametrize("option", ["--map", "--stats"])
+def test_a_frame_is_not_replaced_by_what_else_is_asked_for(folder: Path, fluidwarp: Run, option: str) -> None:
+    ran = fluidwarp(folder, "render", "a.toml", "plate.####.exr", "-o", "w.####.exr", option, "w.1002.exr")
+    assert ran.returncode == 1
+    assert "w.1002.exr cannot hold two results" in ran.stderr
+    assert made(folder) == []
+
+
 # --resume -----------------------------------------------------------------------------------------------------------
 
 
