@@ -281,8 +281,7 @@ def converted(source: MapSource, output: Path, kind: Kind, invert: bool, progres
     maps.check_map(output)
     writable(output)
     files = source.files()
-    for given in [source.path] if is_sequence(output) else files.values():
-        check_kept(given, output)
+    check_kept(source.path, output)
     progress.total = len(files)
     if is_sequence(output) != source.is_sequence:
         raise UserError(f"{source.path} and {output} must both be sequences, or neither")
