@@ -242,7 +242,7 @@ def replacing(path: str | os.PathLike[str], backup: Path | None = None) -> Itera
     try:
         with temporary_file(temporary_beside(target)) as temporary:
             yield temporary
-            if target.exists():  # who may read it stays as it was
+            with suppress(OSError):  # who may read it stays as it was, if it is there and the disk knows of that
                 os.chmod(temporary, stat.S_IMODE(target.stat().st_mode))
             if backup is not None:
                 sync(temporary)

@@ -132,6 +132,19 @@ def test_who_may_read_a_file_stays_so_when_it_is_replaced(tmp_path: Path) -> Non
     assert file.stat().st_mode & 0o777 == 0o640
 
 
+def test_on_a_disk_without_modes_a_file_is_replaced_all_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object) -> None:
+        raise PermissionError(errno.EPERM, os.strerror(errno.EPERM))
+
+    (file := tmp_path / "a.png").touch()
+    monkeypatch.setattr(os, "chmod", refuse)
+    with replacing(file) as temporary:
+        temporary.write_bytes(b"new")
+    assert file.read_bytes() == b"new"
+
+
 @pytest.mark.parametrize(
     ("number", "said"),
     [
