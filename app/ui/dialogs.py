@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
@@ -37,6 +38,9 @@ class Dialog(ABC):
         self.problem = ""
         self.entered = False
         self._open = True
+        self._highest = 0.0  # pixels, to which the window lets it grow
+        self._scrolls = 0.0  # pixels, the height of what can be scrolled
+        self._is_settled = True
         self._top: float | None = None
         self._placed_for: tuple[float, float, float] | None = None
 
@@ -69,6 +73,21 @@ class Dialog(ABC):
     def body(self, ui: Ui) -> bool:
         """Draw what is in it; False once it is done with."""
 
+    @contextmanager
+    def scrolled(self, ui: Ui, foot: float, most: float = float("inf")) -> Iterator[None]:
+        """Draw what scrolls if higher than `most` points or the window; `foot` points stay below it, for buttons."""
+        beneath = 2 * imgui.get_style().item_spacing.y + ui.px(foot) + self._padding(ui)
+        room = max(self._highest - imgui.get_cursor_pos_y() - beneath, ui.px(40))
+        imgui.set_next_window_size_constraints(ImVec2(0, 0), ImVec2(float("inf"), min(room, ui.px(most))))
+        flags = imgui.ChildFlags_.auto_resize_y | imgui.ChildFlags_.nav_flattened
+        imgui.begin_child("scrolled", ImVec2(0, 0), flags)
+        try:
+            yield
+        finally:
+            height, self._scrolls = self._scrolls, imgui.get_cursor_pos_y()
+            imgui.end_child()
+        self._is_settled = self._scrolls == height  # it takes its height in the next frame
+
     def release(self) -> None:  # noqa: B027
         """Free what it holds, if anything; it is not drawn any more."""
 
@@ -79,10 +98,10 @@ class Dialog(ABC):
             imgui.open_popup(name)
         display, edge = imgui.get_io().display_size, ui.px(16)
         self._place(ui, display, edge)
-        width, highest = min(ui.px(self.width), display.x - 2 * edge), max(display.y - 2 * edge, 1.0)
-        imgui.set_next_window_size(ImVec2(width, min(ui.px(self.height), highest)))
-        imgui.set_next_window_size_constraints(ImVec2(width, 0), ImVec2(width, highest))
-        imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(ui.px(24), ui.px(20)))
+        width, self._highest = min(ui.px(self.width), display.x - 2 * edge), max(display.y - 2 * edge, 1.0)
+        imgui.set_next_window_size(ImVec2(width, min(ui.px(self.height), self._highest)))
+        imgui.set_next_window_size_constraints(ImVec2(width, 0), ImVec2(width, self._highest))
+        imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(ui.px(24), self._padding(ui)))
         imgui.push_style_var(imgui.StyleVar_.window_rounding, ui.px(12))
         flags = imgui.WindowFlags_.no_title_bar | imgui.WindowFlags_.no_resize | imgui.WindowFlags_.no_move
         flags |= imgui.WindowFlags_.no_saved_settings
@@ -103,7 +122,10 @@ class Dialog(ABC):
             escaped = imgui.is_key_pressed(imgui.Key.escape) and not imgui.is_any_item_active()
             entered = imgui.is_key_pressed(imgui.Key.enter, False) and not imgui.is_any_item_active()
             self.entered = entered and not imgui.get_io().nav_visible
+            self._is_settled = True
             going_on = self.body(ui) and self._open
+            if not self._is_settled:
+                dialogs.changed()
             # Only the topmost dialog hears Escape; it may just have opened another one.
             is_topmost = dialogs.shown[-1] is self
             going_on = going_on and not (escaped and is_topmost)
@@ -112,6 +134,10 @@ class Dialog(ABC):
         finally:
             imgui.end_popup()
         return going_on
+
+    def _padding(self, ui: Ui) -> float:
+        """Pixels above and below; fewer where there is no room to give away."""
+        return min(ui.px(20), self._highest / 20)
 
     def _place(self, ui: Ui, display: ImVec2, edge: float) -> None:
         """In the middle, and then with its head where it is: what is in it changes under a pointer that rests."""
@@ -281,19 +307,20 @@ class Preferring(Dialog):
 
     def body(self, ui: Ui) -> bool:
         likes = self._preferences
-        ui.dim("Theme")
-        themes = ("dark", "light")
-        likes.theme = themes[ui.segmented("theme", ("Dark", "Light"), themes.index(likes.theme), -1)]
-        ui.dim("Size of the interface")
-        scales = (0.85, 1.0, 1.25, 1.5, 2.0)
-        names = [f"{scale:.0%}".replace("%", " %") for scale in scales]
-        nearest = min(range(len(scales)), key=lambda k: abs(scales[k] - likes.scale))
-        likes.scale = scales[ui.segmented("scale", names, nearest, -1)]
-        imgui.dummy(ImVec2(0, ui.px(2)))
-        likes.embed = ui.check("Keep the picture inside the project", likes.embed)
-        likes.names = ui.check("Names beside the tools", likes.names)
-        automatic = ui.check("Choose the quality automatically", self._state.auto_quality)
-        self._state.auto_quality = likes.auto_quality = automatic
+        with self.scrolled(ui, foot=8 + 32):
+            ui.dim("Theme")
+            themes = ("dark", "light")
+            likes.theme = themes[ui.segmented("theme", ("Dark", "Light"), themes.index(likes.theme), -1)]
+            ui.dim("Size of the interface")
+            scales = (0.85, 1.0, 1.25, 1.5, 2.0)
+            names = [f"{scale:.0%}".replace("%", " %") for scale in scales]
+            nearest = min(range(len(scales)), key=lambda k: abs(scales[k] - likes.scale))
+            likes.scale = scales[ui.segmented("scale", names, nearest, -1)]
+            imgui.dummy(ImVec2(0, ui.px(2)))
+            likes.embed = ui.check("Keep the picture inside the project", likes.embed)
+            likes.names = ui.check("Names beside the tools", likes.names)
+            automatic = ui.check("Choose the quality automatically", self._state.auto_quality)
+            self._state.auto_quality = likes.auto_quality = automatic
         imgui.dummy(ImVec2(0, ui.px(8)))
         imgui.set_cursor_pos_x(imgui.get_window_width() - ui.px(24 + 96))
         if ui.button("Done", primary=True, width=96) or self.entered:

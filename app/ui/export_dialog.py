@@ -261,6 +261,24 @@ class ExportDialog(Dialog):
         return rate_of(self.clip, self.choices.fps)
 
     def body(self, ui: Ui) -> bool:
+        with self.scrolled(ui, foot=6 + 32):
+            self._ask(ui)
+        imgui.dummy(ImVec2(0, ui.px(6)))
+        if self.session.is_moving:  # beside the buttons, which stay where they are when it comes to rest
+            imgui.align_text_to_frame_padding()
+            ui.dim("Still moving: " + ("recorded until you export." if self.animation else "this moment is exported."))
+            imgui.same_line()
+        imgui.set_cursor_pos_x(imgui.get_window_width() - ui.px(24 + 96 + 8 + 96))
+        if ui.button("Cancel", width=96):
+            return False
+        imgui.same_line()
+        with ui.enabled(self._can_start):
+            if ui.button("Export", primary=True, width=96) or (self.entered and self._can_start):
+                return not self.attempt(self._start)
+        return True
+
+    def _ask(self, ui: Ui) -> None:
+        """A row for each setting."""
         choices = self.choices
         imgui.align_text_to_frame_padding()
         ui.dim("Preset")
@@ -342,19 +360,6 @@ class ExportDialog(Dialog):
         ui.wrapped(str(self.output), ui.palette.dim, 13)
         if os.path.exists(self.output):
             ui.text("This file exists and will be replaced.", ui.palette.accent, 13)
-        imgui.dummy(ImVec2(0, ui.px(6)))
-        if self.session.is_moving:  # beside the buttons, which stay where they are when it comes to rest
-            imgui.align_text_to_frame_padding()
-            ui.dim("Still moving: " + ("recorded until you export." if self.animation else "this moment is exported."))
-            imgui.same_line()
-        imgui.set_cursor_pos_x(imgui.get_window_width() - ui.px(24 + 96 + 8 + 96))
-        if ui.button("Cancel", width=96):
-            return False
-        imgui.same_line()
-        with ui.enabled(self._can_start):
-            if ui.button("Export", primary=True, width=96) or (self.entered and self._can_start):
-                return not self.attempt(self._start)
-        return True
 
     def _choose(self, kind: int) -> None:
         """Take another kind; a name that is still the one proposed goes with it."""

@@ -103,15 +103,14 @@ class Offer(Dialog):
         offered = self._recovery.offered
         ui.wrapped("fluidwarp ended before this was saved. It is here up to the last change.", ui.palette.dim, 14)
         imgui.dummy(ImVec2(0, ui.px(4)))
-        imgui.begin_child("offered", ImVec2(0, ui.px(HEIGHT) * min(len(offered), ROWS)))
         restored = discarded = None
-        for number, found in enumerate(offered):
-            imgui.push_id(number)
-            pressed = self._row(ui, found, ui.px(HEIGHT) * number)
-            restored = found if pressed == "restore" else restored
-            discarded = found if pressed == "discard" else discarded
-            imgui.pop_id()
-        imgui.end_child()
+        with self.scrolled(ui, foot=2 + 32, most=HEIGHT * ROWS):
+            for number, found in enumerate(offered):
+                imgui.push_id(number)
+                pressed = self._row(ui, found, ui.px(HEIGHT) * number)
+                restored = found if pressed == "restore" else restored
+                discarded = found if pressed == "discard" else discarded
+                imgui.pop_id()
         imgui.dummy(ImVec2(0, ui.px(2)))
         imgui.set_cursor_pos_x(imgui.get_window_width() - ui.px(24 + 96))
         later = ui.button("Later", width=96)

@@ -62,6 +62,20 @@ class SaveDialog(Dialog):
         return self.folder / (self.name.strip().removesuffix(SUFFIX) + SUFFIX)
 
     def body(self, ui: Ui) -> bool:
+        with self.scrolled(ui, foot=6 + 32):
+            entered = self._ask(ui)
+        imgui.dummy(ImVec2(0, ui.px(6)))
+        imgui.set_cursor_pos_x(imgui.get_window_width() - ui.px(24 + 96 + 8 + 96))
+        if ui.button("Cancel", width=96):
+            return False
+        imgui.same_line()
+        with ui.enabled(bool(self.name.strip())):
+            if (ui.button("Save", primary=True, width=96) or entered) and self.name.strip():
+                return not self._save()
+        return True
+
+    def _ask(self, ui: Ui) -> bool:
+        """Where it goes, and what goes into it; True if Enter was pressed in the name."""
         imgui.set_next_item_width(imgui.get_content_region_avail().x - ui.px(104))
         if self._is_new:
             imgui.set_keyboard_focus_here()
@@ -86,15 +100,7 @@ class SaveDialog(Dialog):
         else:
             about = f"A small file that needs {self._picture} to stay where it is."
         ui.wrapped(about, ui.palette.dim, 13)
-        imgui.dummy(ImVec2(0, ui.px(6)))
-        imgui.set_cursor_pos_x(imgui.get_window_width() - ui.px(24 + 96 + 8 + 96))
-        if ui.button("Cancel", width=96):
-            return False
-        imgui.same_line()
-        with ui.enabled(bool(self.name.strip())):
-            if (ui.button("Save", primary=True, width=96) or entered) and self.name.strip():
-                return not self._save()
-        return True
+        return entered
 
     def _save(self) -> bool:
         if not (self.must_embed or self.must_link):

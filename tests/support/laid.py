@@ -15,6 +15,7 @@ from app.ui.viewport import Rect
 
 CLICKED = ("invisible_button", "slider_float", "combo", "input_text", "input_text_with_hint", "menu_item",
            "begin_menu")  # fmt: skip
+ANSWERS = ("Cancel", "Export", "Save", "Don't save", "Open", "Done", "Later")  # seen without scrolling
 NEAR = 1.5  # points that are no fault
 CANVAS = ("zoom", "how", "hint", "legend", "statistics", "catching up", "message", "exporting", "fitting", "loading")
 
@@ -124,9 +125,10 @@ def _cut(thing: Thing, screen: Rect) -> str:
     """How it is cut off, unless what it is in can be scrolled to it; "" if all of it is seen."""
     is_clipped = thing.is_words and thing.clip.width < _rect(thing.within[0].inner_clip_rect).width - NEAR
     rect, down = _seen(thing) if is_clipped else thing.rect, True
+    is_answer = thing.name in ANSWERS and not thing.is_words
     for window in thing.within:
         inside = _rect(window.inner_rect)
-        down = down and not window.scrollbar_y
+        down = is_answer or (down and not window.scrollbar_y)
         if _sticks_out(rect, inside, down):
             return f"{thing.window}: {thing.name!r} {_told(rect)} is cut off by {window.name} {_told(inside)}"
         rect = _whole(window)
