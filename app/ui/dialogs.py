@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from math import floor
 
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
@@ -137,7 +138,7 @@ class Dialog(ABC):
 
     def _padding(self, ui: Ui) -> float:
         """Pixels above and below; fewer where there is no room to give away."""
-        return min(ui.px(20), self._highest / 20)
+        return floor(min(ui.px(20), self._highest / 20))
 
     def _place(self, ui: Ui, display: ImVec2, edge: float) -> None:
         """In the middle, and then with its head where it is: what is in it changes under a pointer that rests."""
