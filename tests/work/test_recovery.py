@@ -530,6 +530,71 @@ def test_a_folder_that_cannot_be_written_is_told_and_tried_again(desk: Desk) -> 
     assert is_all_of(found_in(desk.root), desk.document)
 
 
+def test_what_could_not_be_written_is_tried_again_though_nothing_more_is_done(
+    desk: Desk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(recovery, "AGAIN", 0.05)
+    desk.root.parent.mkdir()
+    desk.root.write_text("a file is in the way")
+    desk.push(2)
+    desk.write()
+    assert desk.journal.trouble is not None
+    desk.root.unlink()
+    until(lambda: desk.journal.trouble is None)
+    desk.die()
+    assert is_all_of(found_in(desk.root), desk.document)
+
+
+def test_what_could_not_be_written_is_tried_again_at_the_end(desk: Desk) -> None:
+    desk.root.parent.mkdir()
+    desk.root.write_text("a file is in the way")
+    desk.push(2)
+    desk.write()
+    assert desk.journal.trouble is not None
+    desk.root.unlink()
+    desk.die()
+    assert is_all_of(found_in(desk.root), desk.document)
+
+
+def test_a_journal_that_is_too_large_is_neither_written_nor_read(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(recovery, "MOST", 2000)
+    whole = 0
+    while desk.journal.trouble is None:
+        whole = len(desk.document.recipe.stroke)
+        desk.push()
+        desk.write()
+    assert whole > 2
+    assert "with all its history it has more than 0 MB; save the work" in desk.journal.trouble
+    desk.die()
+    found = found_in(desk.root)
+    assert found.work.strokes == whole
+    folder = found.held.folder
+    found.leave()
+    assert files_in(folder) == ["lock", recovery.JOURNAL]
+    monkeypatch.setattr(recovery, "MOST", (folder / recovery.JOURNAL).stat().st_size - 1)
+    assert find(desk.root)[1] == [
+        f"The journal of unsaved work in {folder} has more than 0 MB, the most that one may have; it is left there."
+    ]
+    assert files_in(folder) == ["lock", recovery.JOURNAL]
+
+
+def test_work_that_no_recipe_may_hold_is_told_and_kept(desk: Desk) -> None:
+    """Each of its parts is valid in itself; together they would be a hundred million ticks."""
+    desk.push()
+    now = desk.document.recipe
+    fluid = now.fluid.model_copy(update={"dt": 0.001})
+    desk.document.history.commit("Long", now.edited(duration=1e6, fluid=fluid))
+    desk.keep()
+    desk.die()
+    found = found_in(desk.root)
+    with pytest.raises(
+        UserError, match=r"“pattern”: 'duration' .* ticks; make dt larger\. The work is left as it is, in"
+    ):
+        found.load()
+    found.leave()
+    assert is_all_of(found_in(desk.root), desk.document)
+
+
 @pytest.mark.parametrize("gone", ["the journal", "its folder", "all journals"])
 def test_a_journal_that_is_taken_away_is_begun_anew(desk: Desk, gone: str) -> None:
     desk.push(2)
@@ -554,6 +619,7 @@ def test_on_a_disk_without_locks_nothing_is_left(desk: Desk, monkeypatch: pytest
     desk.push(2)
     desk.write()
     assert desk.journal.trouble is not None
+    desk.die()
     assert files_in(desk.root) == []
 
 
