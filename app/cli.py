@@ -14,7 +14,7 @@ import typer
 from typer.core import TyperGroup
 
 from app.errors import Cancelled, UserError, shown
-from app.progress import INTERRUPTED
+from app.progress import INTERRUPTED, deaf_children
 
 if TYPE_CHECKING:
     from app.work.apply_job import MapSource
@@ -71,7 +71,10 @@ def main() -> None:
         if sys.argv[1:] == ["--version"]:  # without pydantic, which typer loads for any option, and takes as long again
             _print_version()
         else:
-            sys.exit(cli(standalone_mode=False))
+            status = cli(standalone_mode=False)
+            if status == INTERRUPTED:  # typer has made that of the exception
+                raise KeyboardInterrupt
+            sys.exit(status)
     except UserError as error:
         _fail(str(error), error.status)
     except Cancelled:
@@ -166,7 +169,8 @@ def edit(
 ) -> None:
     """Open the editor."""
     try:
-        from app.ui.window import run
+        with deaf_children():  # glfw asks one whether it can be loaded
+            from app.ui.window import run
     except ImportError as error:
         raise UserError(f"the window cannot be loaded ({error}); `fluidwarp doctor` says what is missing", 2) from None
     run(file)

@@ -500,6 +500,40 @@ def test_interrupted_leaves_nothing(folder: Path):
     assert here(folder) == before
 
 
+@pytest.mark.parametrize("moment", ["while modules are loaded", "before a job has begun"])
+def test_interrupted_before_it_does_anything_it_says_so(folder: Path, moment: str):
+    import signal
+
+    waiting = "import time; print('now', flush=True); time.sleep(100)"
+    (folder / "typer.py").write_text(waiting)
+    begin = "from app.start import main; main()"
+    if moment == "before a job has begun":
+        begin = f"import app.cli\ndef wait(**_): {waiting}\napp.cli.cli = wait\n{begin}"
+    path = os.pathsep.join([str(folder), str(ROOT)] if moment == "while modules are loaded" else [str(ROOT)])
+    started = subprocess.Popen(
+        [sys.executable, "-c", begin],
+        cwd=folder if moment == "while modules are loaded" else ROOT,
+        env=os.environ | {"PYTHONPATH": path},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert started.stdout is not None
+    assert started.stdout.readline() == "now\n"
+    started.send_signal(signal.SIGINT)
+    _, told = started.communicate(timeout=60)
+    assert (started.returncode, told) == (cli.INTERRUPTED, "fluidwarp: interrupted\n")
+
+
+def test_the_window_that_is_interrupted_says_so(folder: Path, fluidwarp: Run, monkeypatch: pytest.MonkeyPatch):
+    def interrupted(file: Path | None) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(window, "run", interrupted)
+    ran = fluidwarp(folder, "edit")
+    assert (ran.returncode, ran.stderr) == (cli.INTERRUPTED, "fluidwarp: interrupted\n")
+
+
 STUCK = """
 import hashlib, sys
 from pathlib import Path
