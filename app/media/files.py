@@ -7,7 +7,7 @@ import os
 import re
 import shutil
 import stat
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
 from itertools import pairwise, product
@@ -25,11 +25,12 @@ MENDS = {
     errno.EPERM: "no permission; choose another folder or change its permissions",
     errno.EROFS: "the disk is read-only; choose another folder",
     errno.ENAMETOOLONG: "the name is too long; choose a shorter one",
+    errno.ELOOP: "it is a link; remove it, or choose another folder",
     errno.EEXIST: "a file of this name is in the way; choose another folder",
     errno.ENOTDIR: "a part of its path is a file; choose another folder",
     errno.EFBIG: "the file grows larger than this disk allows; choose another folder or a smaller size",
 }
-MOST_RUNS = 8  # of missing numbers that are named
+MOST_RUNS = 8  # of numbers, and names, that are told
 
 NUMBER = re.compile(r"%(?:0(\d{1,2}))?d|#{2,}")
 """What stands for the number in the name of a sequence's files: %d, %04d, or #### for %04d."""
@@ -179,6 +180,27 @@ def check_numbers(pattern: str | os.PathLike[str], there: Collection[int], wante
     raise UserError(
         f"{said}; make them, or give --frames.", in_window=f"{said}; make them, or number the others without a gap."
     )
+
+
+def listed(names: Sequence[str]) -> str:
+    """Names in a line: those that differ in a number alone as one, such as "a.png, plate.1001-1004,1010.exr"."""
+    alike: dict[tuple[str, str], list[str]] = {}
+    for name in names:
+        stem = os.path.splitext(name)[0]
+        found = re.search(r"[0-9]+(?=[^0-9]*$)", stem)
+        start, end = found.span() if found else (len(stem), len(stem))
+        alike.setdefault((name[:start], name[end:]), []).append(name[start:end])
+    told, left = list[str](), len(names)
+    for (before, after), numbers in list(alike.items())[:MOST_RUNS]:
+        runs: list[list[str]] = []
+        for number in sorted(numbers, key=lambda number: (len(number.lstrip("0")), number)):
+            if runs and runs[-1][-1] and number == f"{int(runs[-1][-1]) + 1:0{len(runs[-1][-1])}d}":
+                runs[-1].append(number)
+            else:
+                runs.append([number])
+        left -= sum(map(len, runs[:MOST_RUNS]))
+        told.append(before + ",".join("-".join(dict.fromkeys((run[0], run[-1]))) for run in runs[:MOST_RUNS]) + after)
+    return ", ".join(told) + (f" and {left} more" if left else "")
 
 
 def takes_place(output: str | os.PathLike[str], source: str | os.PathLike[str]) -> bool:

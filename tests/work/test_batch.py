@@ -223,8 +223,21 @@ def test_the_command_line(folder: Path):
         "fluidwarp: 1 of 3 pictures failed; all others are written",
     ]
     assert sorted(contents(folder / "out")) == ["p0.png", "p1.png"]
-    assert fluidwarp("gone.png", "missing.png", "-o", "new/folder").returncode == 1
+    gone = [f"gone.{number}.png" for number in (1001, 1002, 1003, 1010)]
+    ran = fluidwarp(*gone, "-o", "new/folder")
+    assert ran.returncode == 1
+    assert ran.stderr.splitlines() == [
+        f"fluidwarp: Cannot read {folder / gone[0]}: there is no such file; check the name.",
+        "fluidwarp: 4 of 4 pictures failed: gone.1001-1003,1010.png; none is written",
+    ]
     assert not (folder / "new").exists()
+    (folder / "empty.png").write_bytes(b"")
+    ran = fluidwarp("gone.png", "p0.png", "empty.png", "-o", "out")
+    named = "gone.png, empty.png; try one of them alone to see why"
+    assert ran.stderr.splitlines()[1:] == [f"fluidwarp: 2 of 3 pictures failed: {named}; all others are written"]
+    ran = fluidwarp("gone.png", "-o", "out")
+    assert ran.returncode == 1
+    assert ran.stderr == f"fluidwarp: Cannot read {folder / 'gone.png'}: there is no such file; check the name.\n"
     ran = fluidwarp("p0.png", "p1.png", "-o", "a.toml/out")
     assert ran.stderr == "fluidwarp: Cannot write a.toml/out: a part of its path is a file; choose another folder.\n"
     ran = fluidwarp("p2.png", "-o", "out")
