@@ -139,6 +139,26 @@ def test_several_pictures(folder: Path, fluidwarp: Run):
     assert {"cat warped.png", "dog warped.png"} <= here(folder)
 
 
+def test_a_file_whose_name_has_a_number_s_place_is_that_file(folder: Path, fluidwarp: Run):
+    """If there is one of exactly that name; as a result it would be a sequence, which nobody has asked for."""
+    (folder / "50%d.png").write_bytes((folder / "cat.png").read_bytes())
+    write_map(folder / "50%d.npy", Displacement(np.zeros((48, 64, 2), np.float32)))
+    for words in (["render", "a.toml"], ["apply", "50%d.npy"]):
+        ran = fluidwarp(folder, *words, "50%d.png", "-o", "501.png")
+        assert (ran.returncode, ran.stderr) == (0, "")
+        before = here(folder)
+        for output in ("{name}-w.png", "new"):
+            ran = fluidwarp(folder, *words, "cat.png", "50%d.png", "-o", output)
+            line = "50%d.png would number the files of a sequence as the name of a result; rename it"
+            assert (ran.returncode, ran.stderr) == (1, f"fluidwarp: {line}\n")
+        ran = fluidwarp(folder, *words, "50%d.png", "-o", "50%d.png")
+        assert (ran.returncode, ran.stderr) == (
+            1,
+            "fluidwarp: 50%d.png would be replaced by its own result; choose another name\n",
+        )
+        assert here(folder) == before
+
+
 def test_the_other_pictures_of_a_recipe_are_looked_for_beside_it(folder: Path, fluidwarp: Run):
     (folder / "elsewhere").mkdir()
     mask = '[[viscosity]]\nkind = "picture"\npicture = "cat.png"\nscale = 1.0\n'

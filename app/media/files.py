@@ -108,6 +108,11 @@ def is_sequence(path: str | os.PathLike[str]) -> bool:
     return NUMBER.search(Path(path).name) is not None
 
 
+def stands_for_files(path: str | os.PathLike[str]) -> bool:
+    """Whether `path`, which is read, numbers its files: if there is a file of exactly this name, it is that file."""
+    return is_sequence(path) and not os.path.lexists(path)
+
+
 def numbered(pattern: str | os.PathLike[str], number: int) -> Path:
     """The file of a sequence that has this number."""
     path = Path(pattern)
@@ -209,7 +214,7 @@ def takes_place(output: str | os.PathLike[str], source: str | os.PathLike[str]) 
     if os.path.dirname(output) != folder:
         return False
     pattern = os.path.basename(output)
-    if is_sequence(name):
+    if stands_for_files(source):
         # with so many digits two that differ in nothing but their padding are alike
         return number_in(name, pattern) is not None or numbered(name, 10**17) == numbered(pattern, 10**17)
     return name == pattern or number_in(pattern, name) is not None
