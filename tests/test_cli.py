@@ -634,6 +634,39 @@ def test_what_is_lost_is_told_in_a_line(folder: Path, fluidwarp: Run):
     assert (ran.returncode, ran.stdout, ran.stderr) == (0, "", line)
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="limits the size of files as Linux does")
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["-o", "x.png", "--map", "m.exr"], r"fluidwarp: Cannot write m\.exr: .*\. x\.png is written\.\n"),
+        (
+            ["-o", "x.%d.png", "--stats", "s.json", "--map", "m.exr"],
+            r"fluidwarp: Cannot write m\.exr: .*\. x\.%d\.png is written\.\n",
+        ),
+        (["-o", "x.exr", "--bits", "32"], r"fluidwarp: Cannot write x\.exr: .*[^n]\.\n"),
+    ],
+    ids=["a picture", "frames", "nothing"],
+)
+def test_of_several_results_those_that_are_written_are_told_where_one_fails(folder: Path, words: list[str], said: str):
+    """In a process of its own, whose files may not grow beyond 9,000 bytes: a map of 64 x 48 has 12,000 or more."""
+    code = (
+        "import resource, signal; signal.signal(signal.SIGXFSZ, signal.SIG_IGN);"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (9_000, 9_000)); from app.start import main; main()"
+    )
+    ran = subprocess.run(
+        [sys.executable, "-c", code, "render", "a.toml", *words],
+        cwd=folder,
+        env=os.environ | {"PYTHONPATH": str(ROOT), "MESA_SHADER_CACHE_DISABLE": "true"},
+        capture_output=True,
+        text=True,
+    )
+    assert ran.returncode == 1
+    assert re.fullmatch(said, ran.stderr)
+    assert {name for name in here(folder) if name[0] in "xms"} == ({"x.png"} if words[1] == "x.png" else set()) | {
+        f"x.{number}.png" for number in range(5) if "%" in words[1]
+    }
+
+
 def test_a_fold_is_told(folder: Path, fluidwarp: Run):
     values = np.zeros((48, 64, 2), np.float32)
     values[:, 32:, 0] = -0.1

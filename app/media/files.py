@@ -244,6 +244,19 @@ def cannot_write(path: str | os.PathLike[str], error: OSError) -> UserError:
     return UserError(f"Cannot write {path}: {reason}.")
 
 
+@contextmanager
+def telling(written: list[Path]) -> Iterator[None]:
+    """Let a `UserError` of the block also say which of several results are `written` by then: they stay."""
+    try:
+        yield
+    except UserError as error:
+        if not written:
+            raise
+        are = f"{' and '.join(path.name for path in written)} {'are' if len(written) > 1 else 'is'} written"
+        told, in_window = (f"{said.removesuffix('.')}. {are}." for said in (str(error), error.in_window))
+        raise UserError(told, error.status, in_window) from error
+
+
 def sync(path: Path) -> None:
     """Wait until what is in a file, or which files are in a folder, is on the disk itself: a power cut leaves it."""
     if path.is_dir() and os.name == "nt":
