@@ -415,6 +415,8 @@ def _perform_many(tasks: Sequence[Piece], jobs: int, cluster: str | None) -> Non
         raise typer.Exit(1)
     if failures:
         others = "all others are written" if failures < len(tasks) else "none is written"
+        order = {task.label: number for number, task in enumerate(tasks)}
+        failed.sort(key=lambda one: order[one.label])
         raise UserError(f"{failures} of {len(tasks)} pictures failed{_named(failed)}; {others}")
 
 

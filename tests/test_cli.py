@@ -31,6 +31,7 @@ from app.work.jobs import Job, Outputs
 from solver.gl.context import GPU, NoSuchDevice
 from solver.gl.device import Device
 from support.commands import Run
+from support.permissions import as_a_user, needs_permissions
 
 ROOT = Path(__file__).parent.parent
 RECIPE = """
@@ -337,6 +338,61 @@ def test_missing_words_are_told_in_one_line(
     assert (ended.value.code, told.out, told.err.count("\n")) == (2, "", 1)
     command = f" {words[0]}" if words[0] in ("render", "fit") else ""
     assert told.err.endswith(f"`fluidwarp{command} --help` explains what is wanted\n")
+
+
+READ_ONLY = {
+    ("render", "a.toml", "-o", "shut/x.png"): "Cannot write shut/x.png: no permission",
+    ("render", "a.toml", "-o", "shut/x.mp4"): "Cannot write shut/x.mp4: no permission",
+    ("render", "a.toml", "-o", "shut/x.%04d.png"): "Cannot write shut/x.%04d.png: no permission",
+    ("render", "a.toml", "-o", "old.png"): "Cannot write old.png: that file is read-only",
+    ("render", "a.toml", "-o", "x.png", "--map", "shut/m.exr"): "Cannot write shut/m.exr: no permission",
+    ("render", "a.toml", "-o", "x.png", "--stats", "shut/s.json"): "Cannot write shut/s.json: no permission",
+    ("render", "a.toml", "-o", "x.png", "--states", "shut/states"): "Cannot write shut/states: no permission",
+    ("render", "a.toml", "cat.png", "cat.png", "-o", "shut/{name}-w.png"): "would both become",
+    ("render", "a.toml", "cat.png", "dog.png", "-o", "shut"): "Cannot write shut: no permission",
+    ("render", "a.toml", "cat.png", "dog.png", "-o", "shut/new"): "Cannot write shut/new: no permission",
+    ("render", "a.toml", "-i", "secret.png", "-o", "x.png"): "Cannot read secret.png: no permission to read it",
+    ("render", "none/a.toml", "-o", "x.png"): "Cannot read none/a.toml: no permission to read it",
+    ("render", "a.toml", "-o", "none/x.png"): "Cannot write none/x.png: no permission",
+    ("apply", "m.npy", "cat.png", "-o", "shut/x.png"): "Cannot write shut/x.png: no permission",
+    ("convert", "m.npy", "-o", "shut/m.exr"): "Cannot write shut/m.exr: no permission",
+    ("fit", "a.toml", "-o", "shut/b.toml"): "Cannot write shut/b.toml: no permission",
+    ("gallery", "-o", "shut/gallery"): "Cannot write shut/gallery: no permission",
+}
+
+
+@needs_permissions
+def test_where_permissions_forbid_it_a_sentence_says_so_and_nothing_is_touched(folder: Path):
+    write_map(folder / "m.npy", Displacement(np.zeros((48, 64, 2), np.float32)))
+    for name in ("secret.png", "old.png", "dog.png"):
+        (folder / name).write_bytes((folder / "cat.png").read_bytes())
+    for name, mode in {"shut": 0o555, "none": 0}.items():
+        (folder / name).mkdir()
+        (folder / name / "a.toml").write_text(RECIPE)
+        (folder / name).chmod(mode)
+    (folder / "secret.png").chmod(0)
+    (folder / "old.png").chmod(0o444)
+    code = f"""
+import sys
+from app import cli
+for words in {list(READ_ONLY)!r}:
+    sys.argv = ["fluidwarp", *words]
+    try:
+        cli.main()
+    except SystemExit as ended:
+        print(ended.code, file=sys.stderr)
+"""
+    before = here(folder)
+    try:
+        told = as_a_user(code, folder).stderr.splitlines()
+        assert here(folder) == before
+        assert here(folder / "shut") == {"a.toml"}
+    finally:
+        (folder / "none").chmod(0o755)
+    assert told[1::2] == ["1"] * len(READ_ONLY)
+    for line, said in zip(told[::2], READ_ONLY.values(), strict=True):
+        assert line.startswith("fluidwarp: ")
+        assert said in line
 
 
 # -- what does not ----------------------------------------------------------------------------------------------------

@@ -276,6 +276,7 @@ def _trouble(error: Exception, root: Path) -> str:
         reason = f"with all its history it has more than {MOST >> 20} MB; save the work, and open it again"
     # Nobody chooses this folder or its names.
     reason = reason.removesuffix(" or choose another folder").removesuffix("; choose another folder")
+    reason = reason.replace("choose another folder or ", "")
     return f"If fluidwarp crashes, what is not saved is lost: the journal in {root} cannot be written ({reason})."
 
 

@@ -41,6 +41,7 @@ from app.work.session import Session
 from killing import Painter, digest_of, digest_of_warp
 from solver.gl.device import Device
 from support.editing import Robot, pattern, small_project
+from support.permissions import as_a_user, needs_permissions
 from support.widgets import Widgets
 
 
@@ -645,6 +646,38 @@ for number in range(30):
     assert 3 < well < 30
     assert "cannot be written" in told[-1][1]
     assert found_in(tmp_path / "journals").work.strokes >= well
+
+
+@needs_permissions
+def test_a_folder_of_journals_that_is_read_only_is_told_and_written_once_it_is_not(tmp_path: Path) -> None:
+    (tmp_path / "journals").mkdir(mode=0o555)
+    code = """
+from pathlib import Path
+from work.test_recovery import Desk, recovery, small_project, until
+recovery.AGAIN = 0.05
+root = Path("journals").resolve()
+desk = Desk(root, small_project(Path.cwd()))
+desk.push(2)
+desk.write()
+print(desk.journal.trouble)
+print(recovery.find(root))
+root.chmod(0o755)
+until(lambda: desk.journal.trouble is None)
+root.chmod(0o111)
+print(recovery.find(root))
+root.chmod(0o755)
+desk.die()
+"""
+    done = as_a_user(code, tmp_path)
+    assert done.stderr == ""
+    root = tmp_path / "journals"
+    assert done.stdout.splitlines() == [
+        f"If fluidwarp crashes, what is not saved is lost: the journal in {root} cannot be written (no permission; "
+        "change its permissions).",
+        "([], [])",
+        f"([], ['The journal of unsaved work in {root} cannot be read (Permission denied); it is left there.'])",
+    ]
+    assert found_in(root).work.strokes == 2
 
 
 # In the window -------------------------------------------------------------------------------------------------------
