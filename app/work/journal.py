@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import sys
 import zlib
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -83,12 +84,14 @@ class Work:
         index: which of them is the present.
         saved: the recipe as it was saved last, or opened.
         is_grid_automatic: nobody has chosen the grid.
+        is_cut: more followed in the journal that it was read from, which is damaged.
     """
 
     entries: tuple[Entry, ...]
     index: int
     saved: Recipe
     is_grid_automatic: bool = False
+    is_cut: bool = field(default=False, compare=False)
 
     @property
     def recipe(self) -> Recipe:
@@ -212,20 +215,27 @@ def read(data: bytes) -> tuple[Origin, Work]:
         raise Newer
     reader = _Reader()
     failures = (ValueError, TypeError, KeyError, IndexError, AttributeError, RecursionError)
-    for line in lines:
+    is_cut = False
+    for number, line in enumerate(lines):
         try:
             reader.follow(_record(line))
         except failures:
+            is_cut = any(map(_is_whole, lines[number:]))  # and not just the end of what a kill or a power cut leaves
             break
     if reader.origin is None or not reader.entries:
         raise Damaged
-    return reader.origin, Work(tuple(reader.entries), reader.index, reader.saved, reader.is_grid_automatic)
+    entries = tuple(reader.entries)
+    return reader.origin, Work(entries, reader.index, reader.saved, reader.is_grid_automatic, is_cut)
 
 
 def _record(line: bytes) -> dict[str, Any]:
-    if line[8:9] != b" " or int(line[:8], 16) != zlib.crc32(line[9:]):
+    if not _is_whole(line):
         raise ValueError
     return json.loads(line[9:])
+
+
+def _is_whole(line: bytes) -> bool:
+    return re.match(rb"[0-9a-fA-F]{8} ", line) is not None and int(line[:8], 16) == zlib.crc32(line[9:])
 
 
 class _Reader:

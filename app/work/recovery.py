@@ -370,6 +370,9 @@ def find(root: Path) -> tuple[list[Found], list[str]]:
                 held.discard()
             else:
                 found.append(one)
+                if one.work.is_cut:
+                    cut = f"The last of the unsaved work on “{one.origin.name}” is damaged"
+                    notices.append(f"{cut}; what came before it can be restored.")
                 continue
         lock.release()
     return sorted(found, key=lambda one: one.when, reverse=True), notices

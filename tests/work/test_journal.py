@@ -194,6 +194,9 @@ def test_a_record_that_says_what_none_can_costs_nothing_before_it(record: Any) -
         assert same(found, before)
         assert found.edits[:2] == (len(before.entries), before.index)
         assert found.is_unsaved == before.is_unsaved
+        assert found.is_cut
+        assert not read(data)[1].is_cut
+        assert not read(data + line(record)[:-3])[1].is_cut
 
 
 @pytest.mark.parametrize(

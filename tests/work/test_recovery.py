@@ -579,6 +579,19 @@ def test_a_journal_that_is_too_large_is_neither_written_nor_read(desk: Desk, mon
     assert files_in(folder) == ["lock", recovery.JOURNAL]
 
 
+def test_work_whose_last_is_damaged_is_found_with_a_sentence(desk: Desk) -> None:
+    desk.push(3)
+    desk.write()
+    desk.die()
+    file = next(desk.root.rglob(recovery.JOURNAL))
+    *lines, third, fourth = file.read_bytes().splitlines(keepends=True)
+    file.write_bytes(b"".join([*lines, third.replace(b"push", b"hush"), fourth]))
+    (found,), notices = find(desk.root)
+    assert notices == ["The last of the unsaved work on “pattern” is damaged; what came before it can be restored."]
+    assert 0 < found.work.strokes < 3
+    found.leave()
+
+
 def test_work_that_no_recipe_may_hold_is_told_and_kept(desk: Desk) -> None:
     """Each of its parts is valid in itself; together they would be a hundred million ticks."""
     desk.push()
