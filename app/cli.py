@@ -339,7 +339,7 @@ def _check_output(*outputs: Path | None) -> None:
 
     for output in filter(None, outputs):
         if str(output) == "-":
-            raise UserError("fluidwarp writes files, and nothing to standard output (-); give a name, such as out.png")
+            raise UserError("a result is a file, and not standard output (-); give it a name, such as out.png")
         if output.name.lower() in (*FORMATS, *ANIMATIONS):
             raise UserError(f"{output} is an ending without a name; give one such as out{output.name}")
 

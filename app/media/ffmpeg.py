@@ -27,9 +27,14 @@ def executable() -> str:
     import imageio_ffmpeg
 
     try:
-        return imageio_ffmpeg.get_ffmpeg_exe()
+        found = imageio_ffmpeg.get_ffmpeg_exe()
     except RuntimeError as error:
         raise UserError("No ffmpeg was found: install one, or set IMAGEIO_FFMPEG_EXE to its path.") from error
+    try:
+        subprocess.run([found, "-version"], stdin=subprocess.DEVNULL, capture_output=True, check=True)
+    except (OSError, subprocess.CalledProcessError):  # what the variable names is taken as it is
+        raise UserError(f"{found} is no ffmpeg that runs here; set IMAGEIO_FFMPEG_EXE to one, or to nothing.") from None
+    return found
 
 
 @functools.cache

@@ -85,6 +85,8 @@ class Record:
     def _read(self) -> Iterable[tuple[int, str]]:
         if not self._path.exists():
             return
+        if self._path.stat().st_size > MOST:
+            raise UserError(f"Cannot read {self._path}: it has more than {MOST >> 20} MB; remove it.")
         for line in read_input(self._path, "record", MOST).decode("ascii", "replace").splitlines():
             number, _, made_of = line.partition(" ")
             if number.isdecimal() and len(number) < 19:

@@ -634,3 +634,20 @@ def test_a_folder_of_states_is_bounded_and_may_be_full(folder: Path, monkeypatch
     assert "No more states are kept" in outcome.notices[0]
     assert "the disk is full" in outcome.notices[0]
     assert contents(folder / "full") == contents(folder / "out")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="links are made otherwise there")
+def test_a_link_among_states_is_not_followed(folder: Path):
+    """What it leads to may be anything of whoever has put it there, or of whoever renders."""
+    (folder / "b.toml").write_text(f"{next(iter(WORK.values()))}[output]\nfps = 70\n")
+    words = {"first": 0, "last": None, "states": folder / "states"}
+    assert part(folder, "a", **words)[1].error == ""
+    *_, state = sorted((folder / "states").iterdir())
+    (folder / "precious").write_text("of somebody")
+    state.unlink()
+    state.symlink_to(folder / "precious")
+    _, outcome = part(folder, "b", **words)
+    assert outcome.error == ""
+    assert outcome.notices == (f"No more states are kept: {state} is a link; remove it",)
+    assert (folder / "precious").read_text() == "of somebody"
+    assert contents(folder / "a") == contents(folder / "b")

@@ -212,6 +212,9 @@ def test_a_damaged_record_costs_no_more_than_the_work(folder: Path, fluidwarp: R
     ran = fluidwarp(folder, *words, "--resume")
     assert ran.stderr == "fluidwarp: 1 of 4 frames were whole and are kept\n"
     assert fluidwarp(folder, *words, "--resume").stderr == "fluidwarp: 4 of 4 frames were whole and are kept\n"
+    os.truncate(record, 300 * 2**20)
+    line = f"fluidwarp: Cannot read {record.name}: it has more than 256 MB; remove it.\n"
+    assert fluidwarp(folder, *words, "--resume").stderr == line
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="links and pipes are made otherwise there")
