@@ -426,7 +426,8 @@ def _named(failed: Sequence[Outcome]) -> str:
 
     if len(failed) == 1:
         return ""
-    whys = {outcome.error.replace(outcome.label, "").replace(Path(outcome.label).name, "") for outcome in failed}
+    named = [(shown(outcome.label), shown(Path(outcome.label).name), outcome.error) for outcome in failed]
+    whys = {error.replace(label, "").replace(name, "") for label, name, error in named}
     why = "; try one of them alone to see why" if len(whys) > 1 else ""
     names = [Path(outcome.label).name for outcome in failed]
     return f": {listed(names if len({*names}) == len(names) else [outcome.label for outcome in failed])}{why}"

@@ -306,7 +306,7 @@ def _origin(told: dict[str, Any]) -> Origin:
 
 def _text(value: Any) -> str:
     """A text that may be a name, as all of a journal's are."""
-    if not isinstance(value, str) or "\0" in value:
+    if not isinstance(value, str) or b"\0" in os.fsencode(value):
         raise ValueError
     return value
 

@@ -486,6 +486,15 @@ def test_an_ffmpeg_that_does_not_run_is_named(tmp_path: Path, monkeypatch: pytes
             ffmpeg.executable.__wrapped__()
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="asks /proc")
+def test_ctrl_c_does_not_reach_an_ffmpeg_that_is_asked_something(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """It would say half of it, and be taken for one that does not run."""
+    (tmp_path / "ffmpeg").write_text("#!/bin/sh\ncut -d' ' -f6 /proc/$$/stat\n")
+    (tmp_path / "ffmpeg").chmod(0o755)
+    monkeypatch.setattr(ffmpeg, "executable", lambda: str(tmp_path / "ffmpeg"))
+    assert int(ffmpeg.ask().stdout) != os.getsid(0)
+
+
 def test_an_encoder_that_is_killed_says_why(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """By the system, for want of memory as a rule; and by its own write beyond the largest file that is allowed."""
     real, wrapper = ffmpeg.executable(), tmp_path / "wrapper"

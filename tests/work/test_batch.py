@@ -223,12 +223,12 @@ def test_the_command_line(folder: Path):
         "fluidwarp: 1 of 3 pictures failed; all others are written",
     ]
     assert sorted(contents(folder / "out")) == ["p0.png", "p1.png"]
-    gone = [f"gone.{number}.png" for number in (1001, 1002, 1003, 1010)]
+    gone = [*(f"gone.{number}.png" for number in (1001, 1002, 1003, 1010)), "new\nline.png"]
     ran = fluidwarp(*gone, "-o", "new/folder")
     assert ran.returncode == 1
     assert ran.stderr.splitlines() == [
         f"fluidwarp: Cannot read {folder / gone[0]}: there is no such file; check the name.",
-        "fluidwarp: 4 of 4 pictures failed: gone.1001-1003,1010.png; none is written",
+        r"fluidwarp: 5 of 5 pictures failed: gone.1001-1003,1010.png, new\nline.png; none is written",
     ]
     assert not (folder / "new").exists()
     (folder / "empty.png").write_bytes(b"")
