@@ -553,6 +553,17 @@ def test_bad_forces_name_the_force(folder: Path, fluidwarp: Run):
         assert here(folder) == {"a.toml", "b.toml", "cat.png"}
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="names are text there")
+def test_a_recipe_that_could_not_name_its_picture_is_not_fitted(folder: Path, fluidwarp: Run):
+    picture = os.fsdecode(b"caf\xe9.png")
+    (folder / "cat.png").rename(folder / picture)
+    (folder / "b.toml").write_text(RECIPE + "[[handle]]\nat = [0.3, 0.4]\nto = [0.4, 0.4]\n")
+    ran = fluidwarp(folder, "fit", "b.toml", "-i", picture, "-o", "c.toml")
+    assert ran.returncode == 1
+    assert ran.stderr == "fluidwarp: c.toml cannot name caf\\udce9.png, whose name is not UTF-8; rename it\n"
+    assert "c.toml" not in here(folder)
+
+
 def test_a_force_that_never_acts_is_remarked_on(folder: Path, fluidwarp: Run):
     force = '[[force]]\nname = "x"\nkind = "point"\npoint = [0.5, 0.5]\ndirection = [1, 0]\nat = [7]\n'
     (folder / "b.toml").write_text(f'picture = "cat.png"\nduration = 0.2\n[fluid]\ngrid = 32\n{force}')

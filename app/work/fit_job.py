@@ -128,4 +128,7 @@ class FitJob:
         if self.image is None and found.project is not None:
             return recipe.edited(picture=None)
         file = found.source_file(self.image)
-        return recipe.edited(picture=file and name_from(target, file))
+        name = file and name_from(target, file)
+        if name and name != name.encode("utf-8", "replace").decode():
+            raise UserError(f"{self.output} cannot name {file}, whose name is not UTF-8; rename it")
+        return recipe.edited(picture=name)

@@ -338,6 +338,9 @@ def _changed(recipe: Recipe, changes: dict[str, Any]) -> Recipe:
 
 def _valid(key: str, value: Any) -> Any:
     """The value of a key of a recipe, as far as the key itself says what it may be."""
+    if key == "picture" and value is not None:
+        _alone(key).model_validate({key: _text(value).encode("utf-8", "replace").decode()})
+        return value  # which need not be UTF-8, as no recipe's text can say
     return getattr(_alone(key).model_validate({key: frozen(value)}), key)
 
 

@@ -310,7 +310,7 @@ class Found:
             UserError: if the picture is gone, or cannot be read, or the work is none that can be done.
         """
         try:
-            self.work.recipe.checked(f"“{self.origin.name}”")
+            self.work.recipe.edited(picture=None).checked(f"“{self.origin.name}”")
         except UserError as error:
             raise UserError(f"{error}. The work is left as it is, in {self.held.folder}.") from None
         file = picture_file(self.origin, self.work.recipe)

@@ -451,6 +451,19 @@ def test_what_is_no_file_is_told_in_a_sentence_and_nothing_of_it_is_removed(desk
     assert kept.exists()
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="names are text there")
+def test_work_on_a_picture_whose_name_is_not_utf8_is_found(tmp_path: Path) -> None:
+    small_project(tmp_path)
+    picture = tmp_path / os.fsdecode(b"caf\xe9.png")
+    (tmp_path / "pattern.png").rename(picture)
+    desk = Desk(tmp_path / "journals", projects.from_picture(picture))
+    desk.push(2)
+    desk.die()
+    found = found_in(desk.root)
+    assert found.work.strokes == 2
+    assert (found.file, found.load().recipe) == (picture, desk.document.recipe)
+
+
 @pytest.mark.parametrize("is_project", [False, True])
 def test_a_picture_that_is_gone_is_told_and_the_work_kept(desk: Desk, tmp_path: Path, is_project: bool) -> None:
     """By its own name, also where a project names it."""
