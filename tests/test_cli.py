@@ -560,7 +560,7 @@ def test_a_recipe_that_could_not_name_its_picture_is_not_fitted(folder: Path, fl
     (folder / "b.toml").write_text(RECIPE + "[[handle]]\nat = [0.3, 0.4]\nto = [0.4, 0.4]\n")
     ran = fluidwarp(folder, "fit", "b.toml", "-i", picture, "-o", "c.toml")
     assert ran.returncode == 1
-    assert ran.stderr == "fluidwarp: c.toml cannot name caf\\udce9.png, whose name is not UTF-8; rename it\n"
+    assert ran.stderr == "fluidwarp: Cannot refer to caf\\udce9.png: its name is not UTF-8; rename it.\n"
     assert "c.toml" not in here(folder)
 
 

@@ -60,6 +60,15 @@ def name_from(folder: Path, file: Path) -> str:
         return Path(os.path.abspath(file)).as_posix()
 
 
+def in_text(name: str) -> str:
+    """A file's name, for a recipe, whose text is UTF-8. Raises `UserError` if the name is not."""
+    try:
+        name.encode()
+    except UnicodeEncodeError:
+        raise UserError(f"Cannot refer to {name}: its name is not UTF-8; rename it.") from None
+    return name
+
+
 def writable(path: str | os.PathLike[str]) -> Path:
     """The real path behind `path`, known to be a file or free, in a folder that is there.
 

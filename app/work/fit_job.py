@@ -11,7 +11,7 @@ import numpy as np
 
 from app.errors import UserError
 from app.media.clip import Clip
-from app.media.files import check_kept, name_from, replacing, telling, writable
+from app.media.files import check_kept, in_text, name_from, replacing, telling, writable
 from app.media.landmarks import Pairs, check_ending, read_pairs, write_pairs
 from app.media.opening import Opened, check_picture
 from app.media.outlines import read_outlines
@@ -128,7 +128,4 @@ class FitJob:
         if self.image is None and found.project is not None:
             return recipe.edited(picture=None)
         file = found.source_file(self.image)
-        name = file and name_from(target, file)
-        if name and name != name.encode("utf-8", "replace").decode():
-            raise UserError(f"{self.output} cannot name {file}, whose name is not UTF-8; rename it")
-        return recipe.edited(picture=name)
+        return recipe.edited(picture=file and in_text(name_from(target, file)))
