@@ -156,6 +156,8 @@ def numbered_files(pattern: str | os.PathLike[str]) -> dict[int, Path]:
     folder = Path(pattern).parent
     try:
         names = os.listdir(folder)
+    except FileNotFoundError:
+        raise UserError(f"Cannot read {pattern}: there is no folder {folder}; check the name.") from None
     except OSError as error:
         raise UserError(f"Cannot read {pattern}: {error.strerror or error}.") from None
     found = sorted((number, name) for name in names if (number := number_in(pattern, name)) is not None)
