@@ -66,7 +66,7 @@ def test_files_are_in_the_order_of_their_numbers(tmp_path: Path) -> None:
     assert [*numbered_files(tmp_path / "a.%d.png")] == [9, 10, 100]
     with pytest.raises(UserError, match="there is no such file"):
         numbered_files(tmp_path / "b.%d.png")
-    with pytest.raises(UserError, match="there is no folder .*gone; check the name"):
+    with pytest.raises(UserError, match=r"there is no folder .*gone; check the name"):
         numbered_files(tmp_path / "gone" / "f.%d.png")
 
 
