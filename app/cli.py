@@ -14,11 +14,12 @@ import typer
 from typer.core import TyperGroup
 
 from app.errors import Cancelled, UserError, shown
-from app.progress import INTERRUPTED
+from app.progress import INTERRUPTED, deaf_children
 
 if TYPE_CHECKING:
     from app.work.apply_job import MapSource
     from app.work.tasks import Piece
+    from app.work.worker import Outcome
 
 # Whatever is slow to import is imported where it is used: a command line has to answer at once.
 
@@ -71,7 +72,10 @@ def main() -> None:
         if sys.argv[1:] == ["--version"]:  # without pydantic, which typer loads for any option, and takes as long again
             _print_version()
         else:
-            sys.exit(cli(standalone_mode=False))
+            status = cli(standalone_mode=False)
+            if status == INTERRUPTED:  # typer has made that of the exception
+                raise KeyboardInterrupt
+            sys.exit(status)
     except UserError as error:
         _fail(str(error), error.status)
     except Cancelled:
@@ -110,11 +114,22 @@ def _has_folder() -> bool:
 
 def _usage(error: Any) -> str:
     """What is wrong with the words of a command line, and where they are explained."""
-    said, context = error.format_message().rstrip("."), getattr(error, "ctx", None)
+    said, context = _wrong_value(error) or error.format_message().rstrip("."), getattr(error, "ctx", None)
     command = "" if context is None or context.parent is None else f" {context.info_name}"
     if context is None and sys.argv[1] in _names():  # click names none where an option lacks its argument
         command = f" {sys.argv[1]}"
     return f"{said[:1].lower()}{said[1:]}; `fluidwarp{command} --help` explains what is wanted"
+
+
+def _wrong_value(error: Any) -> str:
+    """What is wrong with the value of an option; "" if it is something else."""
+    option = next((name for name in getattr(getattr(error, "param", None), "opts", ()) if name.startswith("--")), "")
+    if not option or type(error.__cause__).__name__ != "ValidationError":
+        return ""
+    from app.model.validation import expected
+
+    wanted = expected(error.__cause__)
+    return wanted and f"{option} must be {wanted}"
 
 
 def _names() -> set[str]:
@@ -166,7 +181,8 @@ def edit(
 ) -> None:
     """Open the editor."""
     try:
-        from app.ui.window import run
+        with deaf_children():  # glfw asks one whether it can be loaded
+            from app.ui.window import run
     except ImportError as error:
         raise UserError(f"the window cannot be loaded ({error}); `fluidwarp doctor` says what is missing", 2) from None
     run(file)
@@ -288,7 +304,8 @@ def render(
     OUT.png is the picture at the end, OUT.mp4 or OUT.gif the animation, OUT.%04d.png its frames.
     A clip is warped frame by frame, and keeps its sound.
 
-    Several pictures are written to the folder OUT under their own names, or to a name such as OUT/{name}-w.png.
+    Pictures are written to the folder OUT under their own names, if it has no ending or there are several, or to a name
+    such as OUT/{name}-w.png.
     """
     from app.work.jobs import MapOutput, Outputs
     from app.work.tasks import Edits, Task, opened
@@ -315,8 +332,21 @@ def render(
     _perform(task, given, jobs, cluster, gpu)
 
 
+def _check_output(*outputs: Path | None) -> None:
+    """Raise `UserError` for what is no name of a file or a folder, though one could be made of it."""
+    from app.media.encoders import ANIMATIONS
+    from app.media.formats import FORMATS
+
+    for output in filter(None, outputs):
+        if str(output) == "-":
+            raise UserError("a result is a file, and not standard output (-); give it a name, such as out.png")
+        if output.name.lower() in (*FORMATS, *ANIMATIONS):
+            raise UserError(f"{output} is an ending without a name; give one such as out{output.name}")
+
+
 def _perform(piece: Piece, given: list[Path], jobs: int, cluster: str | None, gpu: int | None) -> None:
     """Do it for all that is given, one or many."""
+    _check_output(*piece.outputs.files, piece.outputs.states)
     if gpu is not None and cluster is not None:
         raise UserError("--gpu is for this machine; start the workers of --cluster with FLUIDWARP_GPU set instead")
     _choose(gpu)
@@ -352,7 +382,7 @@ def _part(frames: str | None) -> tuple[int, int | None]:
         return 0, None
     first, dash, last = frames.partition("-")
     numbers = [number for number in (first, last) if number]
-    whole = first and all(number.isdecimal() and len(number) < 16 for number in numbers)
+    whole = first and all(number.isascii() and number.isdecimal() and len(number) < 16 for number in numbers)
     if not whole or (last and int(last) < int(first)):
         raise UserError(f"--frames must be like 0-99, 100- or 7, not {frames}")
     return int(first), (int(last) if last else None if dash else int(first))
@@ -362,24 +392,45 @@ def _perform_many(tasks: Sequence[Piece], jobs: int, cluster: str | None) -> Non
     """Do all, with a line about each that fails."""
     from app.progress import leave, on_terminal
     from app.work.batch import run_batch
-    from app.work.worker import Outcome
 
     written = 0
+    failed: list[Outcome] = []
 
     def report(outcome: Outcome) -> None:
         nonlocal written
+        if outcome.error:
+            failed.append(outcome)
         written += not outcome.error
-        _tell(*(_about(outcome.label, said) for said in (outcome.error, *outcome.notices, outcome.verdict) if said))
+        error = outcome.error if len(failed) == 1 else ""  # the names of all that fail are told at the end
+        _tell(*(_about(outcome.label, said) for said in (error, *outcome.notices, outcome.verdict) if said))
 
+    many = f"{len(tasks)} picture{'s' * (len(tasks) > 1)}"
     alone = jobs == 1 or cluster is not None  # no processes of ours, which would have to be waited for
     try:
-        with on_terminal(f"{len(tasks)} pictures", len(tasks), leave if alone else None) as progress:
+        with on_terminal(many, len(tasks), leave if alone else None) as progress:
             failures = run_batch(tasks, report, progress, jobs, cluster, _tell)
     except Cancelled:
-        _fail(f"cancelled; {written} of {len(tasks)} pictures are written, nothing is half-written", INTERRUPTED)
+        _fail(f"cancelled; {written} of {many} are written, nothing is half-written", INTERRUPTED)
+    if failures and len(tasks) == 1:
+        raise typer.Exit(1)
     if failures:
         others = "all others are written" if failures < len(tasks) else "none is written"
-        raise UserError(f"{failures} of {len(tasks)} pictures failed; {others}")
+        order = {task.label: number for number, task in enumerate(tasks)}
+        failed.sort(key=lambda one: order[one.label])
+        raise UserError(f"{failures} of {len(tasks)} pictures failed{_named(failed)}; {others}")
+
+
+def _named(failed: Sequence[Outcome]) -> str:
+    """Which of several have failed, and whether what is told of the first goes for all of them."""
+    from app.media.files import listed
+
+    if len(failed) == 1:
+        return ""
+    named = [(shown(outcome.label), shown(Path(outcome.label).name), outcome.error) for outcome in failed]
+    whys = {error.replace(label, "").replace(name, "") for label, name, error in named}
+    why = "; try one of them alone to see why" if len(whys) > 1 else ""
+    names = [Path(outcome.label).name for outcome in failed]
+    return f": {listed(names if len({*names}) == len(names) else [outcome.label for outcome in failed])}{why}"
 
 
 def _about(label: str, said: str) -> str:
@@ -448,6 +499,7 @@ def fit(
     from app.work.fit_job import FitJob
     from solver.gl.device import Device
 
+    _check_output(output, arrived)
     job = FitJob(recipe, tuple(pairs or ()), masks, output, arrived, image, evaluations, local, max_pixels)
     job.check()
     _choose(gpu)
@@ -508,7 +560,8 @@ def apply(
 ) -> None:
     """Warp pictures, clips or numbered files by a warp map, made by fluidwarp or another program.
 
-    Several pictures are written to the folder OUT under their own names, or to a name such as OUT/{name}-w.png.
+    Pictures are written to the folder OUT under their own names, if it has no ending or there are several, or to a name
+    such as OUT/{name}-w.png.
     """
     from app.model.recipe import Recipe
     from app.work.apply_job import Application
@@ -565,6 +618,7 @@ def convert(
     from app.progress import on_terminal
     from app.work.apply_job import converted
 
+    _check_output(output)
     source = _map_source(map_, kind, grid, overscan, max_pixels)
     _choose(gpu)
     with on_terminal(output.name, None) as progress:
@@ -584,6 +638,7 @@ def gallery(
     gpu: Gpu = None,
 ) -> None:
     """Render the figures of the paper and of the guide: results, animations and contact sheets."""
+    _check_output(output)
     from app.gallery import figures, retouching
     from app.progress import on_terminal
     from solver.gl.device import Device

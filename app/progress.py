@@ -190,6 +190,23 @@ def _watchdog(wish: threading.Event, at_once: Callable[[], None]) -> Iterator[No
 
 
 @contextmanager
+def deaf_children() -> Iterator[None]:
+    """Keep Ctrl+C and a hang-up, which reach every process of a terminal, from those that are started in the block.
+
+    They inherit what this thread has blocked, while for itself it only waits until the block ends; a handler that a
+    process sets for itself would come too late for one that is still being started.
+    """
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGHUP})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
 def on_terminal(description: str, total: int | None, at_once: Callable[[], None] | None = leave) -> Iterator[Progress]:
     """A `Progress` drawn as a bar with the time left on stderr, silent when that is no terminal; Ctrl+C cancels.
 

@@ -31,6 +31,7 @@ from app.work.jobs import Job, Outputs
 from solver.gl.context import GPU, NoSuchDevice
 from solver.gl.device import Device
 from support.commands import Run
+from support.permissions import as_a_user, needs_permissions
 
 ROOT = Path(__file__).parent.parent
 RECIPE = """
@@ -137,6 +138,26 @@ def test_several_pictures(folder: Path, fluidwarp: Run):
     ran = fluidwarp(folder, "render", "a.toml", "cat.png", "dog.png", "-o", "{name} warped.png")
     assert (ran.returncode, ran.stderr) == (0, "")
     assert {"cat warped.png", "dog warped.png"} <= here(folder)
+
+
+def test_a_file_whose_name_has_a_number_s_place_is_that_file(folder: Path, fluidwarp: Run):
+    """If there is one of exactly that name; as a result it would be a sequence, which nobody has asked for."""
+    (folder / "50%d.png").write_bytes((folder / "cat.png").read_bytes())
+    write_map(folder / "50%d.npy", Displacement(np.zeros((48, 64, 2), np.float32)))
+    for words in (["render", "a.toml"], ["apply", "50%d.npy"]):
+        ran = fluidwarp(folder, *words, "50%d.png", "-o", "501.png")
+        assert (ran.returncode, ran.stderr) == (0, "")
+        before = here(folder)
+        for output in ("{name}-w.png", "new"):
+            ran = fluidwarp(folder, *words, "cat.png", "50%d.png", "-o", output)
+            line = "50%d.png would number the files of a sequence as the name of a result; rename it"
+            assert (ran.returncode, ran.stderr) == (1, f"fluidwarp: {line}\n")
+        ran = fluidwarp(folder, *words, "50%d.png", "-o", "50%d.png")
+        assert (ran.returncode, ran.stderr) == (
+            1,
+            "fluidwarp: 50%d.png would be replaced by its own result; choose another name\n",
+        )
+        assert here(folder) == before
 
 
 def test_the_other_pictures_of_a_recipe_are_looked_for_beside_it(folder: Path, fluidwarp: Run):
@@ -319,6 +340,61 @@ def test_missing_words_are_told_in_one_line(
     assert told.err.endswith(f"`fluidwarp{command} --help` explains what is wanted\n")
 
 
+READ_ONLY = {
+    ("render", "a.toml", "-o", "shut/x.png"): "Cannot write shut/x.png: no permission",
+    ("render", "a.toml", "-o", "shut/x.mp4"): "Cannot write shut/x.mp4: no permission",
+    ("render", "a.toml", "-o", "shut/x.%04d.png"): "Cannot write shut/x.%04d.png: no permission",
+    ("render", "a.toml", "-o", "old.png"): "Cannot write old.png: that file is read-only",
+    ("render", "a.toml", "-o", "x.png", "--map", "shut/m.exr"): "Cannot write shut/m.exr: no permission",
+    ("render", "a.toml", "-o", "x.png", "--stats", "shut/s.json"): "Cannot write shut/s.json: no permission",
+    ("render", "a.toml", "-o", "x.png", "--states", "shut/states"): "Cannot write shut/states: no permission",
+    ("render", "a.toml", "cat.png", "cat.png", "-o", "shut/{name}-w.png"): "would both become",
+    ("render", "a.toml", "cat.png", "dog.png", "-o", "shut"): "Cannot write shut: no permission",
+    ("render", "a.toml", "cat.png", "dog.png", "-o", "shut/new"): "Cannot write shut/new: no permission",
+    ("render", "a.toml", "-i", "secret.png", "-o", "x.png"): "Cannot read secret.png: no permission to read it",
+    ("render", "none/a.toml", "-o", "x.png"): "Cannot read none/a.toml: no permission to read it",
+    ("render", "a.toml", "-o", "none/x.png"): "Cannot write none/x.png: no permission",
+    ("apply", "m.npy", "cat.png", "-o", "shut/x.png"): "Cannot write shut/x.png: no permission",
+    ("convert", "m.npy", "-o", "shut/m.exr"): "Cannot write shut/m.exr: no permission",
+    ("fit", "a.toml", "-o", "shut/b.toml"): "Cannot write shut/b.toml: no permission",
+    ("gallery", "-o", "shut/gallery"): "Cannot write shut/gallery: no permission",
+}
+
+
+@needs_permissions
+def test_where_permissions_forbid_it_a_sentence_says_so_and_nothing_is_touched(folder: Path):
+    write_map(folder / "m.npy", Displacement(np.zeros((48, 64, 2), np.float32)))
+    for name in ("secret.png", "old.png", "dog.png"):
+        (folder / name).write_bytes((folder / "cat.png").read_bytes())
+    for name, mode in {"shut": 0o555, "none": 0}.items():
+        (folder / name).mkdir()
+        (folder / name / "a.toml").write_text(RECIPE)
+        (folder / name).chmod(mode)
+    (folder / "secret.png").chmod(0)
+    (folder / "old.png").chmod(0o444)
+    code = f"""
+import sys
+from app import cli
+for words in {list(READ_ONLY)!r}:
+    sys.argv = ["fluidwarp", *words]
+    try:
+        cli.main()
+    except SystemExit as ended:
+        print(ended.code, file=sys.stderr)
+"""
+    before = here(folder)
+    try:
+        told = as_a_user(code, folder).stderr.splitlines()
+        assert here(folder) == before
+        assert here(folder / "shut") == {"a.toml"}
+    finally:
+        (folder / "none").chmod(0o755)
+    assert told[1::2] == ["1"] * len(READ_ONLY)
+    for line, said in zip(told[::2], READ_ONLY.values(), strict=True):
+        assert line.startswith("fluidwarp: ")
+        assert said in line
+
+
 # -- what does not ----------------------------------------------------------------------------------------------------
 
 
@@ -383,6 +459,16 @@ BAD = {
     "no place for a folder": (["a.toml", "cat.png", "-o", "cat.png/sub"], "a part of its path is a file"),
     "two of one name": (["a.toml", "cat.png", "cat.png", "-o", "new"], "would both become"),
     "no address": (["a.toml", "cat.png", "-o", "sub.png", "--cluster", "here"], "give for example tcp://host:8786"),
+    "to standard output": (["a.toml", "-o", "-"], "and not standard output (-); give it a name, such as out.png"),
+    "a folder to standard output": (["a.toml", "cat.png", "-o", "-"], "and not standard output (-)"),
+    "states to standard output": (["a.toml", "-o", "x.png", "--states", "-"], "and not standard output (-)"),
+    "numbers to standard output": (["a.toml", "-o", "x.png", "--stats", "-"], "and not standard output (-)"),
+    "an ending alone": (["a.toml", "cat.png", "-o", ".png"], ".png is an ending without a name; give one such as out"),
+    "frames in other digits": (["a.toml", "-o", "x.gif", "--frames", "１-２"], "--frames must be like 0-99, 100- or 7"),
+    "dpi nan": (["a.toml", "-o", "x.png", "--dpi", "nan"], "--dpi must be a finite number, not nan"),
+    "dpi 0": (["a.toml", "-o", "x.png", "--dpi", "0"], "--dpi must be at least 1, not 0"),
+    "bits": (["a.toml", "-o", "x.png", "--bits", "1.5"], "--bits must be a whole number, not 1.5"),
+    "one of one": (["a.toml", "dog.png", "-o", "new"], "dog.png: there is no such file; check the name.\n"),
     "several into one": (["a.toml", "cat.png", "cat.png", "-o", "x.png"], "{name}"),
     "grid 0": (["a.toml", "-o", "x.png", "--grid", "0"], "--grid must be at least 8, not 0"),
     "fps nan": (["a.toml", "-o", "x.gif", "--fps", "nan"], "--fps must be a finite number"),
@@ -467,6 +553,17 @@ def test_bad_forces_name_the_force(folder: Path, fluidwarp: Run):
         assert here(folder) == {"a.toml", "b.toml", "cat.png"}
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="names are text there")
+def test_a_recipe_that_could_not_name_its_picture_is_not_fitted(folder: Path, fluidwarp: Run):
+    picture = os.fsdecode(b"caf\xe9.png")
+    (folder / "cat.png").rename(folder / picture)
+    (folder / "b.toml").write_text(RECIPE + "[[handle]]\nat = [0.3, 0.4]\nto = [0.4, 0.4]\n")
+    ran = fluidwarp(folder, "fit", "b.toml", "-i", picture, "-o", "c.toml")
+    assert ran.returncode == 1
+    assert ran.stderr == "fluidwarp: Cannot refer to caf\\udce9.png: its name is not UTF-8; rename it.\n"
+    assert "c.toml" not in here(folder)
+
+
 def test_a_force_that_never_acts_is_remarked_on(folder: Path, fluidwarp: Run):
     force = '[[force]]\nname = "x"\nkind = "point"\npoint = [0.5, 0.5]\ndirection = [1, 0]\nat = [7]\n'
     (folder / "b.toml").write_text(f'picture = "cat.png"\nduration = 0.2\n[fluid]\ngrid = 32\n{force}')
@@ -498,6 +595,40 @@ def test_interrupted_leaves_nothing(folder: Path):
     assert started.returncode == cli.INTERRUPTED
     assert told == "fluidwarp: cancelled; nothing half-written is left\n"
     assert here(folder) == before
+
+
+@pytest.mark.parametrize("moment", ["while modules are loaded", "before a job has begun"])
+def test_interrupted_before_it_does_anything_it_says_so(folder: Path, moment: str):
+    import signal
+
+    waiting = "import time; print('now', flush=True); time.sleep(100)"
+    (folder / "typer.py").write_text(waiting)
+    begin = "from app.start import main; main()"
+    if moment == "before a job has begun":
+        begin = f"import app.cli\ndef wait(**_): {waiting}\napp.cli.cli = wait\n{begin}"
+    path = os.pathsep.join([str(folder), str(ROOT)] if moment == "while modules are loaded" else [str(ROOT)])
+    started = subprocess.Popen(
+        [sys.executable, "-c", begin],
+        cwd=folder if moment == "while modules are loaded" else ROOT,
+        env=os.environ | {"PYTHONPATH": path},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert started.stdout is not None
+    assert started.stdout.readline() == "now\n"
+    started.send_signal(signal.SIGINT)
+    _, told = started.communicate(timeout=60)
+    assert (started.returncode, told) == (cli.INTERRUPTED, "fluidwarp: interrupted\n")
+
+
+def test_the_window_that_is_interrupted_says_so(folder: Path, fluidwarp: Run, monkeypatch: pytest.MonkeyPatch):
+    def interrupted(file: Path | None) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(window, "run", interrupted)
+    ran = fluidwarp(folder, "edit")
+    assert (ran.returncode, ran.stderr) == (cli.INTERRUPTED, "fluidwarp: interrupted\n")
 
 
 STUCK = """
@@ -568,6 +699,39 @@ def test_what_is_lost_is_told_in_a_line(folder: Path, fluidwarp: Run):
     write_map(folder / "m.npy", Displacement(np.zeros((48, 64, 2), np.float32)))
     ran = fluidwarp(folder, "apply", "m.npy", "pages.tif", "-o", "z.png")
     assert (ran.returncode, ran.stdout, ran.stderr) == (0, "", line)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits the size of files as Linux does")
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["-o", "x.png", "--map", "m.exr"], r"fluidwarp: Cannot write m\.exr: .*\. x\.png is written\.\n"),
+        (
+            ["-o", "x.%d.png", "--stats", "s.json", "--map", "m.exr"],
+            r"fluidwarp: Cannot write m\.exr: .*\. x\.%d\.png is written\.\n",
+        ),
+        (["-o", "x.exr", "--bits", "32"], r"fluidwarp: Cannot write x\.exr: .*[^n]\.\n"),
+    ],
+    ids=["a picture", "frames", "nothing"],
+)
+def test_of_several_results_those_that_are_written_are_told_where_one_fails(folder: Path, words: list[str], said: str):
+    """In a process of its own, whose files may not grow beyond 9,000 bytes: a map of 64 x 48 has 12,000 or more."""
+    code = (
+        "import resource, signal; signal.signal(signal.SIGXFSZ, signal.SIG_IGN);"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (9_000, 9_000)); from app.start import main; main()"
+    )
+    ran = subprocess.run(
+        [sys.executable, "-c", code, "render", "a.toml", *words],
+        cwd=folder,
+        env=os.environ | {"PYTHONPATH": str(ROOT), "MESA_SHADER_CACHE_DISABLE": "true"},
+        capture_output=True,
+        text=True,
+    )
+    assert ran.returncode == 1
+    assert re.fullmatch(said, ran.stderr)
+    assert {name for name in here(folder) if name[0] in "xms"} == ({"x.png"} if words[1] == "x.png" else set()) | {
+        f"x.{number}.png" for number in range(5) if "%" in words[1]
+    }
 
 
 def test_a_fold_is_told(folder: Path, fluidwarp: Run):

@@ -27,18 +27,31 @@ def executable() -> str:
     import imageio_ffmpeg
 
     try:
-        return imageio_ffmpeg.get_ffmpeg_exe()
+        found = imageio_ffmpeg.get_ffmpeg_exe()
     except RuntimeError as error:
         raise UserError("No ffmpeg was found: install one, or set IMAGEIO_FFMPEG_EXE to its path.") from error
+    try:
+        _said([found, "-version"]).check_returncode()
+    except (OSError, subprocess.CalledProcessError):  # what the variable names is taken as it is
+        raise UserError(f"{found} is no ffmpeg that runs here; set IMAGEIO_FFMPEG_EXE to one, or to nothing.") from None
+    return found
 
 
 @functools.cache
 def encoders() -> frozenset[str]:
     """Names of the encoders that this ffmpeg has."""
-    listed = subprocess.run(
-        [executable(), "-hide_banner", "-encoders"], capture_output=True, text=True, check=False
-    ).stdout
+    listed = ask("-encoders").stdout.decode("utf-8", "replace")
     return frozenset(re.findall(r"^ [VAS][A-Z.]{5} (\S+)", listed, re.MULTILINE))
+
+
+def ask(*arguments: str) -> subprocess.CompletedProcess[bytes]:
+    """What ffmpeg says to `ffmpeg arguments...`, in which it writes no file."""
+    return _said([executable(), "-hide_banner", *arguments])
+
+
+def _said(command: list[str]) -> subprocess.CompletedProcess[bytes]:
+    # In a session of its own, since Ctrl+C is ours to handle: one that it has ended would say nothing, or half of it.
+    return subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, start_new_session=True)
 
 
 class Ffmpeg:

@@ -7,7 +7,7 @@ import os
 import re
 import shutil
 import stat
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
 from itertools import pairwise, product
@@ -25,11 +25,12 @@ MENDS = {
     errno.EPERM: "no permission; choose another folder or change its permissions",
     errno.EROFS: "the disk is read-only; choose another folder",
     errno.ENAMETOOLONG: "the name is too long; choose a shorter one",
+    errno.ELOOP: "it is a link; remove it, or choose another folder",
     errno.EEXIST: "a file of this name is in the way; choose another folder",
     errno.ENOTDIR: "a part of its path is a file; choose another folder",
     errno.EFBIG: "the file grows larger than this disk allows; choose another folder or a smaller size",
 }
-MOST_RUNS = 8  # of missing numbers that are named
+MOST_RUNS = 8  # of numbers, and names, that are told
 
 NUMBER = re.compile(r"%(?:0(\d{1,2}))?d|#{2,}")
 """What stands for the number in the name of a sequence's files: %d, %04d, or #### for %04d."""
@@ -57,6 +58,15 @@ def name_from(folder: Path, file: Path) -> str:
         return Path(os.path.relpath(file, folder)).as_posix()
     except ValueError:  # another drive
         return Path(os.path.abspath(file)).as_posix()
+
+
+def in_text(name: str) -> str:
+    """A file's name, for a recipe, whose text is UTF-8. Raises `UserError` if the name is not."""
+    try:
+        name.encode()
+    except UnicodeEncodeError:
+        raise UserError(f"Cannot refer to {name}: its name is not UTF-8; rename it.") from None
+    return name
 
 
 def writable(path: str | os.PathLike[str]) -> Path:
@@ -107,6 +117,11 @@ def is_sequence(path: str | os.PathLike[str]) -> bool:
     return NUMBER.search(Path(path).name) is not None
 
 
+def stands_for_files(path: str | os.PathLike[str]) -> bool:
+    """Whether `path`, which is read, numbers its files: if there is a file of exactly this name, it is that file."""
+    return is_sequence(path) and not os.path.lexists(path)
+
+
 def numbered(pattern: str | os.PathLike[str], number: int) -> Path:
     """The file of a sequence that has this number."""
     path = Path(pattern)
@@ -141,6 +156,8 @@ def numbered_files(pattern: str | os.PathLike[str]) -> dict[int, Path]:
     folder = Path(pattern).parent
     try:
         names = os.listdir(folder)
+    except FileNotFoundError:
+        raise UserError(f"Cannot read {pattern}: there is no folder {folder}; check the name.") from None
     except OSError as error:
         raise UserError(f"Cannot read {pattern}: {error.strerror or error}.") from None
     found = sorted((number, name) for name in names if (number := number_in(pattern, name)) is not None)
@@ -181,13 +198,34 @@ def check_numbers(pattern: str | os.PathLike[str], there: Collection[int], wante
     )
 
 
+def listed(names: Sequence[str]) -> str:
+    """Names in a line: those that differ in a number alone as one, such as "a.png, plate.1001-1004,1010.exr"."""
+    alike: dict[tuple[str, str], list[str]] = {}
+    for name in names:
+        stem = os.path.splitext(name)[0]
+        found = re.search(r"[0-9]+(?=[^0-9]*$)", stem)
+        start, end = found.span() if found else (len(stem), len(stem))
+        alike.setdefault((name[:start], name[end:]), []).append(name[start:end])
+    told, left = list[str](), len(names)
+    for (before, after), numbers in list(alike.items())[:MOST_RUNS]:
+        runs: list[list[str]] = []
+        for number in sorted(numbers, key=lambda number: (len(number.lstrip("0")), number)):
+            if runs and runs[-1][-1] and number == f"{int(runs[-1][-1]) + 1:0{len(runs[-1][-1])}d}":
+                runs[-1].append(number)
+            else:
+                runs.append([number])
+        left -= sum(map(len, runs[:MOST_RUNS]))
+        told.append(before + ",".join("-".join(dict.fromkeys((run[0], run[-1]))) for run in runs[:MOST_RUNS]) + after)
+    return ", ".join(told) + (f" and {left} more" if left else "")
+
+
 def takes_place(output: str | os.PathLike[str], source: str | os.PathLike[str]) -> bool:
     """Whether writing `output` can replace `source`; both are real paths of a file or of a sequence."""
     folder, name = os.path.split(source)
     if os.path.dirname(output) != folder:
         return False
     pattern = os.path.basename(output)
-    if is_sequence(name):
+    if stands_for_files(source):
         # with so many digits two that differ in nothing but their padding are alike
         return number_in(name, pattern) is not None or numbered(name, 10**17) == numbered(pattern, 10**17)
     return name == pattern or number_in(pattern, name) is not None
@@ -215,6 +253,19 @@ def cannot_write(path: str | os.PathLike[str], error: OSError) -> UserError:
     if error.errno == errno.ENOENT and Path(path).parent.is_dir():  # as of /proc
         reason = "its folder takes no new files; choose another"
     return UserError(f"Cannot write {path}: {reason}.")
+
+
+@contextmanager
+def telling(written: list[Path]) -> Iterator[None]:
+    """Let a `UserError` of the block also say which of several results are `written` by then: they stay."""
+    try:
+        yield
+    except UserError as error:
+        if not written:
+            raise
+        are = f"{' and '.join(path.name for path in written)} {'are' if len(written) > 1 else 'is'} written"
+        told, in_window = (f"{said.removesuffix('.')}. {are}." for said in (str(error), error.in_window))
+        raise UserError(told, error.status, in_window) from error
 
 
 def sync(path: Path) -> None:

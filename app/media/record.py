@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import stat
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import fields, is_dataclass
@@ -16,6 +17,7 @@ from app.errors import UserError
 from app.media.files import cannot_write, numbered
 from app.media.inputs import open_input, read_input
 
+ONLY_A_FILE = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)  # no link, and no pipe that nobody reads
 MOST = 256 * 2**20  # bytes of a record: two million frames
 
 
@@ -28,6 +30,9 @@ class Record:
     Args:
         pattern: of the sequence, such as `name.%04d.png`.
         made_of: a digest of all that a file is made of, by its number.
+
+    Raises:
+        UserError: if something else is at its place, as a link, which is not followed.
     """
 
     def __init__(self, pattern: Path, made_of: Callable[[int], str]) -> None:
@@ -36,6 +41,13 @@ class Record:
         name = hashlib.sha256(numbered(pattern, 0).name.encode("utf-8", "surrogateescape")).hexdigest()[:16]
         self._path = pattern.parent / f".fluidwarp-frames-{name}"
         self._lines: dict[int, str] | None = None
+        with suppress(FileNotFoundError):
+            self._check(os.lstat(self._path))
+
+    def _check(self, status: os.stat_result) -> None:
+        if not stat.S_ISREG(status.st_mode):
+            what = "a link" if stat.S_ISLNK(status.st_mode) else "no ordinary file"
+            raise UserError(f"Cannot write {self._path}: it is {what}; remove it, or write to another folder.")
 
     def holds(self, number: int) -> bool:
         """Whether the file of this number is there, byte for byte as it was made of what it would be made of now."""
@@ -50,8 +62,9 @@ class Record:
         """Note that the file of this number was written. Raises `UserError`."""
         try:
             line = f"{number} {self._line(number)}\n".encode()
-            file = os.open(self._path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o666)
+            file = os.open(self._path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | ONLY_A_FILE, 0o666)
             try:
+                self._check(os.fstat(file))
                 # a line that was cut by a full disk or a kill ends here
                 os.write(file, line if self._ends_whole() else b"\n" + line)
             finally:
@@ -72,6 +85,8 @@ class Record:
     def _read(self) -> Iterable[tuple[int, str]]:
         if not self._path.exists():
             return
+        if self._path.stat().st_size > MOST:
+            raise UserError(f"Cannot read {self._path}: it has more than {MOST >> 20} MB; remove it.")
         for line in read_input(self._path, "record", MOST).decode("ascii", "replace").splitlines():
             number, _, made_of = line.partition(" ")
             if number.isdecimal() and len(number) < 19:

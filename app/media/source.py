@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from app.errors import UserError
 from app.media.clip import Clip, coded
-from app.media.files import is_sequence
+from app.media.files import stands_for_files
 from app.media.formats import ENDINGS
 from app.media.inputs import MAX_PIXELS
 from app.media.losses import lost
@@ -39,7 +38,7 @@ def open_source(path: Path, max_pixels: int = MAX_PIXELS, animated: bool = True)
     Raises:
         UserError: if it cannot be read.
     """
-    if is_sequence(path) and not os.path.lexists(path):
+    if stands_for_files(path):
         clip, picture = read_sequence(path, max_pixels)
         if animated or len(clip.files) == 1:
             return Source(picture, clip if animated else None)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import subprocess
 from collections.abc import Callable, Generator
 from contextlib import closing
 from dataclasses import dataclass
@@ -258,10 +257,8 @@ def _losses_of_tracks(told: str) -> list[str]:
 
 def _mastering(file: Path) -> list[str]:
     """What the first frame tells of the display that it was graded on and of its lights, which is not kept."""
-    command = [ffmpeg.executable(), "-hide_banner", "-i", f"file:{file}", "-map", "0:v:0", "-frames:v", "1"]
-    done = subprocess.run(
-        [*command, "-vf", "showinfo", "-f", "null", "-"], stdin=subprocess.DEVNULL, capture_output=True
-    )
+    first = ("-map", "0:v:0", "-frames:v", "1")
+    done = ffmpeg.ask("-i", f"file:{file}", *first, "-vf", "showinfo", "-f", "null", "-")
     told = done.stderr.decode("utf-8", "replace")
     kinds = {"Mastering display metadata": "mastering display", "Content light level metadata": "light levels"}
     found = [name for sign, name in kinds.items() if sign in told]
@@ -337,9 +334,7 @@ def _banner(file: Path) -> str:
     """What ffmpeg says of a file it opens; imageio-ffmpeg brings no ffprobe."""
     if not read_start(file, "video", 1):
         raise UserError(f"Cannot read {file}: the file is empty; save or download it again.")
-    command = [ffmpeg.executable(), "-hide_banner", "-i", f"file:{file}"]
-    done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, check=False)
-    return done.stderr.decode("utf-8", "replace")
+    return ffmpeg.ask("-i", f"file:{file}").stderr.decode("utf-8", "replace")
 
 
 def _untagged(video: str) -> str:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from app.model.recipe import Recipe
 
 DEFAULT_BUDGET = 256 * 2**20
+LISTS = ("viscosity", "freeze", "force", "handle", "pin", "change", "mask", "stroke")  # of a recipe
 
 
 @dataclass(frozen=True)
@@ -138,7 +139,7 @@ class History:
 def _own_bytes(recipe: Recipe, before: Recipe | None) -> int:
     """Bytes that `recipe` needs beside `before`: the parts that are not the same objects, roughly."""
     size = 1024
-    for name in ("viscosity", "freeze", "force", "handle", "pin", "change", "mask", "stroke"):
+    for name in LISTS:
         known = {id(part) for part in getattr(before, name)} if before is not None else set()
         parts = getattr(recipe, name)
         size += 8 * len(parts)

@@ -4,13 +4,40 @@ from __future__ import annotations
 
 import difflib
 import re
+from contextlib import suppress
 from datetime import date, time
+from math import isfinite
 from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 
 from app.errors import UserError
 from app.model.schema import label_of, only_values
+
+_WANTED = {
+    "float_type": "a number",
+    "float_parsing": "a number",
+    "int_type": "a whole number",
+    "int_parsing": "a whole number",
+    "int_parsing_size": "a smaller number",
+    "int_from_float": "a whole number",
+    "string_type": "a text in quotes",
+    "bool_type": "true or false",
+    "tuple_type": "a list",
+    "list_type": "a list",
+    "dict_type": "a table",
+    "model_type": "a table",
+    "model_attributes_type": "a table",
+    "finite_number": "a finite number",
+    "greater_than": "greater than {gt}",
+    "greater_than_equal": "at least {ge}",
+    "less_than": "less than {lt}",
+    "less_than_equal": "at most {le}",
+    "too_short": "a list of at least {min_length}",
+    "too_long": "a list of at most {max_length}",
+    "literal_error": "one of {expected}",
+    "string_too_short": "a text that is not empty",
+}
 
 
 def complaint(error: ValidationError, model: type[BaseModel], data: Any, text: str, source: str) -> UserError:
@@ -83,27 +110,7 @@ def _sentence(fault: Any, path: list[int | str], data: Any, model: type[BaseMode
         return f"{table}{tag!r} must be one of {choices}" + (f", not {context['tag']!r}" if "tag" in context else "")
     if kind == "value_error":
         return f"{table}{key}{': ' if key else ''}{context['error']}"
-    wanted = {
-        "float_type": "a number",
-        "int_type": "a whole number",
-        "int_from_float": "a whole number",
-        "string_type": "a text in quotes",
-        "bool_type": "true or false",
-        "tuple_type": "a list",
-        "list_type": "a list",
-        "dict_type": "a table",
-        "model_type": "a table",
-        "model_attributes_type": "a table",
-        "finite_number": "a finite number",
-        "greater_than": "greater than {gt}",
-        "greater_than_equal": "at least {ge}",
-        "less_than": "less than {lt}",
-        "less_than_equal": "at most {le}",
-        "too_short": "a list of at least {min_length}",
-        "too_long": "a list of at most {max_length}",
-        "literal_error": "one of {expected}",
-        "string_too_short": "a text that is not empty",
-    }.get(kind)
+    wanted = _WANTED.get(kind)
     if wanted is None:
         return f"{table}{key}: {fault['msg']}"
     bounds = {name: f"{bound:g}" if isinstance(bound, float) else bound for name, bound in context.items()}
@@ -113,6 +120,17 @@ def _sentence(fault: Any, path: list[int | str], data: Any, model: type[BaseMode
     if kind == "literal_error" and " or " not in context["expected"]:
         wanted = "{expected}"
     return f"{table}{key!r} must be {wanted.format(**bounds)}{but}"
+
+
+def expected(error: ValidationError) -> str:
+    """What a single word had to be and is not, as "at least 1, not 0"; "" where that is not known."""
+    fault = error.errors(include_url=False)[0]
+    kind, given = fault["type"], str(fault["input"])
+    with suppress(ValueError):
+        kind = kind if isfinite(float(given)) else "finite_number"
+    wanted = _WANTED.get(kind, "")
+    bounds = {name: f"{bound:g}" for name, bound in fault.get("ctx", {}).items() if isinstance(bound, (int, float))}
+    return wanted and f"{wanted.format_map(bounds)}, not {given}"
 
 
 def _shown(value: Any) -> str:

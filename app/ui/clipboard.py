@@ -14,6 +14,7 @@ from app.errors import UserError
 from app.media.files import make_folder
 from app.media.pictures import read_picture, write_picture
 from app.model.picture import Picture
+from app.progress import deaf_children
 
 KEPT = 20  # pictures that were pasted
 GIVING = "from app.ui.clipboard import give; give({path!r})"
@@ -64,7 +65,8 @@ class Giving:
 
     def __init__(self, path: Path) -> None:
         command = [sys.executable, "-c", GIVING.format(path=str(path))]
-        self._process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+        with deaf_children():
+            self._process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
 
     @property
     def is_done(self) -> bool:

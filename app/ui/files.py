@@ -14,7 +14,7 @@ from imgui_bundle import imgui
 from app.errors import UserError
 from app.media import project as projects
 from app.media.clip import rate_of
-from app.media.files import sequence_of
+from app.media.files import in_text, sequence_of
 from app.media.landmarks import ENDINGS
 from app.media.maps import MAP_ENDINGS, holds
 from app.media.opening import check_picture
@@ -165,7 +165,7 @@ class Files:
             UserError: if it is none, or does not fit the picture.
         """
         path = path.resolve()
-        self.workspace.session.start_from_map(str(path))
+        self.workspace.session.start_from_map(in_text(str(path)))
         self.preferences.folder = str(path.parent)
         self.messages.done(f"The picture now starts from {path.name}. Undo removes it.")
 
@@ -175,7 +175,7 @@ class Files:
         Raises:
             UserError: if it cannot be read.
         """
-        session, name = self.workspace.session, str(path.resolve())
+        session, name = self.workspace.session, in_text(str(path.resolve()))
         session.pictures.forget(name)
         session.pictures.load(name)
         session.edit_masks(f"Load {MASKS[of]}", PictureMask(kind="picture", tick=0, of=of, picture=name))

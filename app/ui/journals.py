@@ -14,7 +14,7 @@ class Journals:
 
     Args:
         root: their folder; None keeps none, for tests.
-        messages: are told, once, of a journal that cannot be written.
+        messages: are told, once, of a journal that cannot be written, as long as that is so.
     """
 
     def __init__(self, root: Path | None, messages: Messages) -> None:
@@ -43,8 +43,8 @@ class Journals:
         journal = self._journals[session]
         journal.keep(session.project, session.document, session.is_grid_automatic)
         if journal.trouble is not None and not self._has_warned:
-            self._has_warned = True
-            self._messages.warn(journal.trouble)
+            self._messages.warn(journal.trouble, lambda: journal.trouble is not None)
+        self._has_warned = journal.trouble is not None
 
     def close(self, session: Session) -> None:
         """A work that was open is given up, with what is kept of it."""

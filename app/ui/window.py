@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
@@ -16,6 +16,7 @@ import moderngl
 
 from app.errors import UserError
 from app.media.files import is_sequence
+from app.progress import interruptible, never
 from app.ui.editor import Editor
 from app.ui.events import Button, CloseWish, Drop, Event, Focus, Key, Mods, Move, Text, Wheel
 from app.ui.files import load_any
@@ -143,15 +144,15 @@ class GlfwWindow:
                     glfw.set_window_pos(self.handle, left, max(top, y))
                 return
 
-    def show(self, editor: Editor) -> None:
-        """Run the editor until the person leaves."""
+    def show(self, editor: Editor, cancel: Callable[[], bool] = never) -> None:
+        """Run the editor until the person leaves, or `cancel` says so."""
         last = time.perf_counter()
         editor.commands.clipboard = lambda text: glfw.set_clipboard_string(self.handle, text)
         editor.chooser.native = True
         editor.rehearsal.has_news = self._has_news
         screen = self.device.ctx.detect_framebuffer(0)
-        while not editor.commands.closed:
-            self._wait(editor)
+        while not (editor.commands.closed or cancel()):
+            self._wait(editor, cancel)
             if glfw.get_window_attrib(self.handle, glfw.ICONIFIED):
                 if any(isinstance(event, CloseWish) for event in self.events):
                     if editor.commands.asks_before_quitting:
@@ -181,11 +182,11 @@ class GlfwWindow:
 
     # -- what happens in it -----------------------------------------------------------------------------------------
 
-    def _wait(self, editor: Editor) -> None:
+    def _wait(self, editor: Editor, cancel: Callable[[], bool]) -> None:
         """Wait until there is something to draw."""
         glfw.poll_events()
         started = time.perf_counter()
-        while not (self.events or self._must_draw):
+        while not (self.events or self._must_draw or cancel()):
             left = editor.wait() - (time.perf_counter() - started)
             if left <= 0:
                 return
@@ -267,23 +268,27 @@ def run(file: Path | None = None) -> None:
 
     Raises:
         UserError: if there is no window to be had (status 2), or no such file.
+        KeyboardInterrupt: after Ctrl+C and the like; what was not saved is kept for the next start.
     """
     if file is not None and not (os.path.exists(file) or is_sequence(file)):
         load_any(file)
     likes = Preferences.load()
-    window = GlfwWindow(likes.window)
-    try:
-        editor = Editor(window.device, load_any(sample()), likes, default_folder())
-        if file is not None:
-            editor.workspace.placeholder = editor.session
-            window.events.append(Drop((str(file),)))
+    with interruptible() as cancel:  # an exception in the middle of a callback of the window's would be lost
+        window = GlfwWindow(likes.window)
         try:
-            window.show(editor)
+            editor = Editor(window.device, load_any(sample()), likes, default_folder())
+            if file is not None:
+                editor.workspace.placeholder = editor.session
+                window.events.append(Drop((str(file),)))
+            try:
+                window.show(editor, cancel)
+            finally:
+                likes.window = window.place or likes.window
+                editor.release()
         finally:
-            likes.window = window.place or likes.window
-            editor.release()
-    finally:
-        window.close()
+            window.close()
+        if cancel():
+            raise KeyboardInterrupt
 
 
 def sample() -> Path:

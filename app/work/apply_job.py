@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass, replace
@@ -18,7 +17,7 @@ from app.media.animation import Frame, animation_writer
 from app.media.clip import WHOLE, rate_of
 from app.media.displacement import Displacement, PixelPlaces, cropped, folds
 from app.media.encoders import check_colours, check_output, passes, unheld_of_clip
-from app.media.files import check_kept, check_numbers, is_sequence, numbered_files, writable
+from app.media.files import check_kept, check_numbers, is_sequence, numbered_files, stands_for_files, writable
 from app.media.formats import picture_format, unheld
 from app.media.inputs import MAX_PIXELS
 from app.media.maps import Kind, read_map
@@ -49,7 +48,7 @@ class MapSource:
 
     @property
     def is_sequence(self) -> bool:
-        return is_sequence(self.path) and not os.path.lexists(self.path)
+        return stands_for_files(self.path)
 
     def files(self) -> dict[int, Path]:
         """The map's file, or those of the sequence in the order of their numbers.
@@ -255,7 +254,7 @@ class _Applying:
     def _file(self, number: int) -> Path:
         """The map of a frame."""
         clip, last = self.source.clip, max(self._files)
-        if clip is None or (is_sequence(clip.path) and clip.start in self._files):
+        if clip is None or (stands_for_files(clip.path) and clip.start in self._files):
             return self._files[min(number, last)]
         return self._files[min(min(self._files) + number - clip.start, last)]
 

@@ -25,7 +25,7 @@ from app.media.clip import frame_of
 from app.media.depth import mixed
 from app.media.displacement import Displacement
 from app.media.encoders import passes, unheld_of_clip
-from app.media.files import is_sequence, replacing
+from app.media.files import is_sequence, replacing, telling
 from app.media.formats import picture_format, unheld
 from app.media.maps import map_writer, write_map
 from app.media.record import Record, digest_of
@@ -107,6 +107,7 @@ class _Export:
         # What the results belong to; densities are straight, whatever the picture is.
         like = job.picture if job.frame is None else frame_of(*job.frame)
         self.like = replace(like, premultiplied=False) if job.recipe.mode == "density" else like
+        self.written: list[Path] = []
         self.sentinel = Sentinel(job.recipe.stop, job.recipe.fluid.dt)
         self.numbers: list[dict[str, Any]] = []
         self.dissolves: dict[int, Dissolve] = {}
@@ -119,6 +120,10 @@ class _Export:
         self.replay.release()
 
     def run(self) -> Report:
+        with telling(self.written):
+            return self._run()
+
+    def _run(self) -> Report:
         recipe, job, outputs = self.recipe, self.job, self.outputs
         watched = not self.sentinel.is_idle
         runs, stills = 2 if watched and job.has_frames else 1, self._steps_for_stills()
@@ -129,6 +134,8 @@ class _Export:
         if job.has_frames:
             shown, self.dissolves = shown_positions(Timeline(end, recipe.fluid.dt), recipe, float(job.rate))
             count = self._write_frames(shown, end)
+            maps = outputs.maps.path if outputs.maps and outputs.maps.is_sequence else None
+            self.written += [path for path in (outputs.file, maps) if path is not None]
         else:
             self._go_to(Fraction(end))
             if outputs.file is not None:
@@ -136,6 +143,7 @@ class _Export:
                 picture = self._still(self.like, lambda height: self.progress.parts(steps, height))
                 self.progress.enter("writing")
                 outputs.write(picture, recipe.output.quality)
+                self.written.append(outputs.file)
                 self.progress.count(steps)
             self._note(0, Fraction(end))
             count = 1
@@ -152,6 +160,7 @@ class _Export:
             self.progress.advance(steps_for((found.width, found.height)))
             self.progress.enter("writing the map")
             write_map(outputs.maps.path, found, outputs.maps.kind)
+            self.written.append(outputs.maps.path)
             self.progress.count(steps_for((found.width, found.height)))
         if outputs.stats is not None:
             with replacing(outputs.stats) as temporary:

@@ -11,7 +11,7 @@ import numpy as np
 
 from app.errors import UserError
 from app.media.clip import Clip
-from app.media.files import check_kept, name_from, replacing, writable
+from app.media.files import check_kept, in_text, name_from, replacing, telling, writable
 from app.media.landmarks import Pairs, check_ending, read_pairs, write_pairs
 from app.media.opening import Opened, check_picture
 from app.media.outlines import read_outlines
@@ -114,7 +114,8 @@ class FitJob:
         with replacing(self.output) as temporary:
             temporary.write_text(done.trial.recipe.text(), encoding="utf-8")
         if self.arrived is not None:
-            write_pairs(self.arrived, done.pairs, size)
+            with telling([self.output]):
+                write_pairs(self.arrived, done.pairs, size)
         return replace(done, notices=(*notices, *done.notices))
 
     def _placed(self, found: Opened) -> Recipe:
@@ -127,4 +128,4 @@ class FitJob:
         if self.image is None and found.project is not None:
             return recipe.edited(picture=None)
         file = found.source_file(self.image)
-        return recipe.edited(picture=file and name_from(target, file))
+        return recipe.edited(picture=file and in_text(name_from(target, file)))

@@ -9,23 +9,25 @@ from __future__ import annotations
 
 import json
 import os
+import re
+import sys
 import zlib
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from pydantic import TypeAdapter
+from pydantic import create_model
 
 from app.errors import UserError
 from app.media import project as projects
 from app.media.project import Project
 from app.model.recipe import VERSION as RECIPE_VERSION
 from app.model.recipe import Recipe
-from app.model.schema import frozen, plain
-from app.model.undo import Entry, History
+from app.model.schema import Model, frozen, plain
+from app.model.undo import DEFAULT_BUDGET, LISTS, Entry, History
 
 VERSION = 1
 MOST_DIGITS = 9  # of a version: no number is made of more
@@ -82,12 +84,14 @@ class Work:
         index: which of them is the present.
         saved: the recipe as it was saved last, or opened.
         is_grid_automatic: nobody has chosen the grid.
+        is_cut: more followed in the journal that it was read from, which is damaged.
     """
 
     entries: tuple[Entry, ...]
     index: int
     saved: Recipe
     is_grid_automatic: bool = False
+    is_cut: bool = field(default=False, compare=False)
 
     @property
     def recipe(self) -> Recipe:
@@ -209,46 +213,114 @@ def read(data: bytes) -> tuple[Origin, Work]:
         raise Damaged
     if max(map(len, words[1:])) > MOST_DIGITS or int(words[1]) > VERSION or int(words[2]) > RECIPE_VERSION:
         raise Newer
-    origin: Origin | None = None
-    work = Work((), 0, Recipe())
+    reader = _Reader()
     failures = (ValueError, TypeError, KeyError, IndexError, AttributeError, RecursionError)
-    for line in lines:
+    is_cut = False
+    for number, line in enumerate(lines):
         try:
-            record = _record(line)
-            origin = origin or Origin(**record["origin"])
-            work = _followed(work, record)
+            reader.follow(_record(line))
         except failures:
+            is_cut = any(map(_is_whole, lines[number:]))  # and not just the end of what a kill or a power cut leaves
             break
-    if origin is None or not work.entries:
+    if reader.origin is None or not reader.entries:
         raise Damaged
-    return origin, work
+    entries = tuple(reader.entries)
+    return reader.origin, Work(entries, reader.index, reader.saved, reader.is_grid_automatic, is_cut)
 
 
 def _record(line: bytes) -> dict[str, Any]:
-    if line[8:9] != b" " or int(line[:8], 16) != zlib.crc32(line[9:]):
+    if not _is_whole(line):
         raise ValueError
     return json.loads(line[9:])
 
 
-def _followed(work: Work, record: dict[str, Any]) -> Work:
-    """`work` after a record."""
-    entries = list(work.entries)
-    if "amend" in record:
-        entry = entries[work.index]
-        amended = replace(entry, recipe=_changed(entry.recipe, record["amend"]))
-        return replace(work, entries=(*entries[: work.index], amended, *entries[work.index + 1 :]))
-    del entries[: record.get("drop", 0)]
-    del entries[record.get("keep", len(entries)) :]
-    for name, nbytes, changes in record.get("add", ()):
-        entries.append(Entry(name, _changed(entries[-1].recipe if entries else Recipe(), changes), nbytes))
-    saved = work.saved if work.entries else entries[0].recipe
-    if "saved" in record:
-        nearest, changes = record["saved"]
-        saved = _changed(entries[nearest].recipe, changes)
-    index = record["index"]
-    if not 0 <= index < len(entries):
-        raise IndexError
-    return Work(tuple(entries), index, saved, bool(record.get("automatic", work.is_grid_automatic)))
+def _is_whole(line: bytes) -> bool:
+    return re.match(rb"[0-9a-fA-F]{8} ", line) is not None and int(line[:8], 16) == zlib.crc32(line[9:])
+
+
+class _Reader:
+    """A work as one record after the other says; one that says no such thing raises, and changes nothing."""
+
+    def __init__(self) -> None:
+        self.origin: Origin | None = None
+        self.entries: list[Entry] = []
+        self.index = 0
+        self.saved = Recipe()
+        self.is_grid_automatic = False
+        self._nbytes = 0  # that the lists of the entries take, whatever these share
+
+    def follow(self, record: dict[str, Any]) -> None:
+        if self.origin is None:
+            origin = _origin(record["origin"])
+            self._follow(record)
+            self.origin = origin
+        else:
+            self._follow(record)
+
+    def _follow(self, record: dict[str, Any]) -> None:
+        entries = self.entries
+        if "amend" in record:
+            entry = entries[self.index]
+            entries[self.index] = replace(entry, recipe=_changed(entry.recipe, record["amend"]))
+            self._nbytes += _listed(entries[self.index].recipe) - _listed(entry.recipe)
+            return
+        start = _count(record.get("drop", 0), len(entries))
+        end = start + _count(record.get("keep", len(entries) - start), len(entries) - start)
+        before = entries[end - 1].recipe if end > start else Recipe()
+        nbytes = self._nbytes - sum(_listed(entry.recipe) for entry in (*entries[:start], *entries[end:]))
+        added = list[Entry]()
+        for name, own, changes in record.get("add", ()):
+            before = _changed(before, changes)
+            added.append(Entry(_text(name), before, _count(own)))
+            nbytes += _listed(before)
+            if nbytes > 2 * DEFAULT_BUDGET and end - start + len(added) > 1:  # a history lets the oldest go before that
+                raise ValueError
+
+        def entry_at(number: Any) -> Entry:
+            place = start + _count(number, end - start + len(added) - 1)
+            return entries[place] if place < end else added[place - end]
+
+        index = record["index"]
+        entry_at(index)
+        saved = self.saved if entries else entry_at(0).recipe
+        if "saved" in record:
+            nearest, changes = record["saved"]
+            saved = _changed(entry_at(nearest).recipe, changes)
+        entries[end:] = added
+        del entries[:start]
+        self.index, self.saved, self._nbytes = index, saved, nbytes
+        self.is_grid_automatic = bool(record.get("automatic", self.is_grid_automatic))
+
+
+def _origin(told: dict[str, Any]) -> Origin:
+    origin = Origin(**told)
+    flags = origin.embedded, origin.inside
+    if not all(isinstance(flag, bool) for flag in flags) or (origin.inside and origin.path is None):
+        raise ValueError
+    for text in (origin.name, origin.folder, origin.path or ""):
+        _text(text)
+    for number in (origin.size, origin.crc):
+        _count(number)
+    return origin
+
+
+def _text(value: Any) -> str:
+    """A text that may be a name, as all of a journal's are."""
+    if not isinstance(value, str) or b"\0" in os.fsencode(value):
+        raise ValueError
+    return value
+
+
+def _count(value: Any, most: int = sys.maxsize) -> int:
+    """A whole number from 0 to `most`."""
+    if type(value) is not int or not 0 <= value <= most:
+        raise ValueError
+    return value
+
+
+def _listed(recipe: Recipe) -> int:
+    """Bytes of a recipe's lists, without what is in them, as `History` counts them."""
+    return 1024 + 8 * sum(len(getattr(recipe, name)) for name in LISTS)
 
 
 def _changed(recipe: Recipe, changes: dict[str, Any]) -> Recipe:
@@ -257,16 +329,27 @@ def _changed(recipe: Recipe, changes: dict[str, Any]) -> Recipe:
         before = getattr(recipe, key)
         if isinstance(before, tuple):
             kept, items = value
-            parts[key] = (*before[:kept], *_type(key).validate_python(frozen(items)))
+            _count(kept, len(before))
+            parts[key] = (*before[:kept], *_valid(key, items))
         else:
-            parts[key] = _type(key).validate_python(frozen(value))
+            parts[key] = _valid(key, value)
     return recipe.edited(**parts) if parts else recipe
 
 
+def _valid(key: str, value: Any) -> Any:
+    """The value of a key of a recipe, as far as the key itself says what it may be."""
+    if key == "picture" and value is not None:
+        _alone(key).model_validate({key: _text(value).encode("utf-8", "replace").decode()})
+        return value  # which need not be UTF-8, as no recipe's text can say
+    return getattr(_alone(key).model_validate({key: frozen(value)}), key)
+
+
 @cache
-def _type(key: str) -> TypeAdapter[Any]:
-    annotation: Any = Recipe.model_fields[key].annotation
-    return TypeAdapter(annotation)
+def _alone(key: str) -> type[Model]:
+    """A model of nothing but this key of a recipe."""
+    field = Recipe.model_fields[key]
+    fields: dict[str, Any] = {key: (field.annotation, field)}
+    return create_model(key, __base__=Model, **fields)
 
 
 # -- the pictures -----------------------------------------------------------------------------------------------------

@@ -17,9 +17,10 @@ from datetime import datetime
 from pathlib import Path
 
 from app.errors import UserError
-from app.media.files import MENDS, sync
+from app.media.files import MENDS, sync, temporary_file
 from app.media.project import Project
 from app.model.document import Document
+from app.model.undo import DEFAULT_BUDGET
 from app.work.journal import Damaged, Newer, Origin, Work, beginning, continuation, picture_file, project_of, read
 from app.work.locks import Lock
 
@@ -28,9 +29,15 @@ NEW = f"{JOURNAL}.new"  # until it is whole
 LOCK = "lock"
 SLACK = 4 * 2**20  # bytes that a journal may grow before it is begun anew; and as many again as it began with
 HANDING = 0.1  # seconds that a frame in which a stroke ends may wait for the journal: mostly it is less than one tick
+MOST = DEFAULT_BUDGET  # bytes of a journal: a history takes more in memory than its text takes here
 PAUSE = 0.25  # seconds in which the records of a fluid that comes to rest are put together; a stroke waits for nothing
+AGAIN = 5.0  # seconds after which what could not be written is tried again
 LEAVING = 5.0  # seconds that the disk may take when the program ends
 BINARY = getattr(os, "O_BINARY", 0)  # Windows writes other line ends without it
+
+
+class Large(Exception):
+    """A journal has more than `MOST` bytes."""
 
 
 def default_folder() -> Path:
@@ -92,7 +99,7 @@ class Journal:
         held: the journal that the work was restored from, which this one takes the place of.
 
     Attributes:
-        trouble: why nothing can be written, as a sentence; for the window to take.
+        trouble: why nothing can be written, as a sentence, as long as that is so; for the window to take.
     """
 
     def __init__(self, root: Path, held: LockedFolder | None = None) -> None:
@@ -101,7 +108,8 @@ class Journal:
         self._held = held
         self._seen: tuple[object, ...] = ()
         self._wanted: tuple[Project, Work] | None = None
-        self._written: tuple[Project, Work] | None = None
+        self._written: tuple[Project, Work] | None = None  # is what the file holds
+        self._tried: tuple[Project, Work] | None = None
         self._leaving = False
         self._changed, self._urgent, self._handed = threading.Event(), threading.Event(), threading.Event()
         self._asking = threading.Lock()  # what is wanted, how urgently, and whether it is handed over go together
@@ -131,8 +139,8 @@ class Journal:
 
     @property
     def is_behind(self) -> bool:
-        """True while something has still to be written."""
-        return self._wanted is not self._written
+        """True while something has still to be written, and that has not failed yet."""
+        return self._wanted is not self._tried
 
     def end(self, discard: bool) -> None:
         """Write what has still to be written, and leave the journal where it is; or, `discard`, remove it."""
@@ -164,9 +172,9 @@ class Journal:
     # In the thread.
 
     def _work(self) -> None:
-        leaving = False
+        leaving, again = False, None
         while not leaving:
-            self._changed.wait()
+            self._changed.wait(again)
             self._urgent.wait(PAUSE)
             with self._asking:  # what is asked for from here on wakes it again, and is not cleared away unheard
                 urgent = self._urgent.is_set()
@@ -183,24 +191,27 @@ class Journal:
                         self._handed.set()
                 if self._file is not None and urgent:
                     os.fsync(self._file)
+                self._written, self.trouble, again = wanted, None, None
             except Exception as error:
-                # What is in the file now is not known; with the next edit it is tried again, from the beginning.
+                # What is in the file now is not known: with the next edit, or soon, all of it is written anew.
                 self._close_file()
+                self._written, again = None, AGAIN if isinstance(error, OSError) else None
                 self.trouble = _trouble(error, self._root)
                 self._handed.set()
-            self._written = wanted
+            self._tried = wanted
         self._close_file()
         if self._held is not None:
             self._held.lock.release()
 
     def _write(self, project: Project, work: Work) -> None:
-        if self._file is not None and self._written is not None and self._size <= self._most and self._is_there:
+        if self._file is not None and self._written is not None and self._is_there:
             before = self._written[1]
             if self._written[0] is project and before.saved is work.saved:
                 line = continuation(work, before)
-                _write_all(self._file, line)
-                self._size += len(line)
-                return
+                if self._size + len(line) <= self._most:
+                    _write_all(self._file, line)
+                    self._size += len(line)
+                    return
         self._begin(project, work)
 
     @property
@@ -223,18 +234,21 @@ class Journal:
             self._held = LockedFolder.new(self._root)
         folder = self._held.folder
         path, temporary = folder / JOURNAL, folder / NEW
-        file = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | BINARY, 0o600)
-        try:
-            for line in beginning(Origin.of(project), work):
-                _write_all(file, line)
-            self._size = os.fstat(file).st_size
-            if path.exists():
-                os.fsync(file)  # or a power cut could leave neither of them
-        finally:
-            os.close(file)
-        os.replace(temporary, path)
+        with temporary_file(temporary):
+            file = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | BINARY, 0o600)
+            try:
+                for line in beginning(Origin.of(project), work):
+                    _write_all(file, line)
+                    if os.fstat(file).st_size > MOST:
+                        raise Large
+                self._size = os.fstat(file).st_size
+                if path.exists():
+                    os.fsync(file)  # or a power cut could leave neither of them
+            finally:
+                os.close(file)
+            os.replace(temporary, path)
         self._file = os.open(path, os.O_WRONLY | os.O_APPEND | BINARY)
-        self._most = 2 * self._size + SLACK
+        self._most = min(2 * self._size + SLACK, MOST)
         for changed in (folder, self._root):
             sync(changed)
 
@@ -258,8 +272,11 @@ def _write_all(file: int, data: bytes) -> None:
 
 def _trouble(error: Exception, root: Path) -> str:
     reason = (MENDS.get(error.errno or 0) if isinstance(error, OSError) else None) or str(error)
+    if isinstance(error, Large):
+        reason = f"with all its history it has more than {MOST >> 20} MB; save the work, and open it again"
     # Nobody chooses this folder or its names.
     reason = reason.removesuffix(" or choose another folder").removesuffix("; choose another folder")
+    reason = reason.replace("choose another folder or ", "")
     return f"If fluidwarp crashes, what is not saved is lost: the journal in {root} cannot be written ({reason})."
 
 
@@ -290,8 +307,12 @@ class Found:
         """The project that was worked on, with its picture read again.
 
         Raises:
-            UserError: if the picture is gone, or cannot be read.
+            UserError: if the picture is gone, or cannot be read, or the work is none that can be done.
         """
+        try:
+            self.work.recipe.edited(picture=None).checked(f"“{self.origin.name}”")
+        except UserError as error:
+            raise UserError(f"{error}. The work is left as it is, in {self.held.folder}.") from None
         file = picture_file(self.origin, self.work.recipe)
         try:
             return project_of(self.origin, self.work.recipe)
@@ -337,6 +358,9 @@ def find(root: Path) -> tuple[list[Found], list[str]]:
             one = _look_into(held)
         except Damaged:
             notices.append(f"The journal of unsaved work in {folder} is damaged and cannot be read; it is left there.")
+        except Large:
+            more = f"has more than {MOST >> 20} MB, the most that one may have"
+            notices.append(f"The journal of unsaved work in {folder} {more}; it is left there.")
         except Newer:
             notices.append(f"There is unsaved work of a newer fluidwarp, which alone can restore it: {folder}.")
         except OSError as error:
@@ -346,6 +370,9 @@ def find(root: Path) -> tuple[list[Found], list[str]]:
                 held.discard()
             else:
                 found.append(one)
+                if one.work.is_cut:
+                    cut = f"The last of the unsaved work on “{one.origin.name}” is damaged"
+                    notices.append(f"{cut}; what came before it can be restored.")
                 continue
         lock.release()
     return sorted(found, key=lambda one: one.when, reverse=True), notices
@@ -360,9 +387,13 @@ def _look_into(held: LockedFolder) -> Found | None:
     path = held.folder / JOURNAL
     if not os.path.lexists(path):
         return None
-    if not stat.S_ISREG(path.stat().st_mode):  # a folder, or a pipe, for which one would wait for ever
+    status = path.stat()
+    if not stat.S_ISREG(status.st_mode):  # a folder, or a pipe, for which one would wait for ever
         raise Damaged
-    origin, work = read(path.read_bytes())
+    if status.st_size > MOST:
+        raise Large
+    with path.open("rb") as stream:
+        origin, work = read(stream.read(MOST))
     try:
         when = datetime.fromtimestamp(path.stat().st_mtime)
     except (ValueError, OverflowError):  # the clock, or the disk, is wrong by thousands of years

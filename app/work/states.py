@@ -70,10 +70,12 @@ class StoredStates:
         path = self._path(tick)
         if self._failed or tick == 0 or not (last or tick % EVERY == 0):
             return
-        if path.exists() and tick not in self._damaged:
+        if path.exists() and not path.is_symlink() and tick not in self._damaged:
             return
         parts: dict[str, Any] = self._replay.snapshot()
         try:
+            if path.is_symlink():  # what it leads to is somebody's, and no state of ours
+                raise UserError(f"{path} is a link; remove it")
             with replacing(path) as temporary, temporary.open("wb") as stream:
                 np.savez(stream, about=np.array(self._about(tick)), **parts)
         except UserError as error:  # the animation does not depend on it
@@ -104,7 +106,7 @@ class StoredStates:
     def _ticks(self) -> Iterator[int]:
         for path in self.folder.glob(f"{self._key}-*{SUFFIX}"):
             number = path.name.removeprefix(f"{self._key}-").removesuffix(SUFFIX)
-            if number.isdecimal():
+            if number.isdecimal() and not path.is_symlink():
                 yield int(number)
 
     def _path(self, tick: int) -> Path:

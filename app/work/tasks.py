@@ -12,7 +12,15 @@ from typing import Any, Self, TypeVar
 
 from app.errors import UserError
 from app.media.encoders import ANIMATIONS
-from app.media.files import check_folder, check_kept, is_sequence, make_folder, takes_place, unnumbered
+from app.media.files import (
+    check_folder,
+    check_kept,
+    is_sequence,
+    make_folder,
+    stands_for_files,
+    takes_place,
+    unnumbered,
+)
 from app.media.formats import FORMATS
 from app.media.inputs import MAX_PIXELS
 from app.media.opening import Opened, open_recipe
@@ -192,13 +200,14 @@ def spread(piece: P, pictures: Sequence[Path]) -> list[P]:
     output, stats, maps = piece.outputs.file, piece.outputs.stats, piece.outputs.maps
     folder = output if NAME not in str(output) else None
     if folder is not None and folder.suffix and not os.path.isdir(folder):
-        raise UserError(f"{len(pictures)} pictures cannot all become {output}; write a folder, or out/{NAME}.png")
+        many = f"{len(pictures)} pictures cannot all" if len(pictures) > 1 else "a picture of a cluster cannot"
+        raise UserError(f"{many} become {output}; write a folder, or out/{NAME}.png")
     for path in (stats, maps and maps.path):
         if path is not None and NAME not in str(path) and len(pictures) > 1:
             raise UserError(f"{len(pictures)} pictures cannot all write {path}; put {NAME} into its name")
     pieces = []
     for picture in pictures:
-        into = output and (output if NAME in str(output) else output / (picture.stem + _ending(picture)))
+        into = output and (output if NAME in str(output) else output / (NAME + _ending(picture)))
         one = replace(piece, picture=picture, outputs=replace(piece.outputs, file=into)).named()
         pieces.append(replace(one, outputs=one.outputs.renamed(Path.absolute)))
     _check_apart(pieces)
@@ -209,7 +218,7 @@ def spread(piece: P, pictures: Sequence[Path]) -> list[P]:
 
 def _ending(picture: Path) -> str:
     suffix = picture.suffix.lower()
-    if suffix in CLIP_ENDINGS and not is_sequence(picture):
+    if suffix in CLIP_ENDINGS and not stands_for_files(picture):
         return picture.suffix if suffix in ANIMATIONS else ".mp4"
     return picture.suffix if suffix in FORMATS else ".png"
 
@@ -217,7 +226,7 @@ def _ending(picture: Path) -> str:
 def _check_apart(tasks: Sequence[Piece]) -> None:
     """Raise `UserError` if two would be written to one file, or one to where any is read from."""
     pictures = {os.path.realpath(task.picture): task.picture for task in tasks if task.picture is not None}
-    sequences = [real for real in pictures if is_sequence(real)]
+    sequences = [real for real in pictures if stands_for_files(real)]
     seen: dict[str, Path | None] = {}
     for task in tasks:
         task.check_names([] if task.picture is None else [task.picture])
@@ -237,6 +246,14 @@ def _check_apart(tasks: Sequence[Piece]) -> None:
 
 
 def named(path: Path, picture: Path) -> Path:
-    """`path` with the picture's name in place of "{name}": of a sequence with its number, if it is to be one too."""
-    whole = is_sequence(picture) and Path(path).suffix.lower() in FORMATS
-    return Path(str(path).replace(NAME, picture.stem if whole else unnumbered(picture)))
+    """`path` with the picture's name in place of "{name}": of a sequence with its number, if it is to be one too.
+
+    Raises:
+        UserError: if the name of a single picture would number files.
+    """
+    numbers = stands_for_files(picture)
+    whole = not numbers or Path(path).suffix.lower() in FORMATS
+    found = Path(str(path).replace(NAME, picture.stem if whole else unnumbered(picture)))
+    if found != path and is_sequence(found) and not (numbers or is_sequence(path)):
+        raise UserError(f"{picture.name} would number the files of a sequence as the name of a result; rename it")
+    return found

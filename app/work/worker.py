@@ -5,18 +5,17 @@ from __future__ import annotations
 import os
 import pickle
 import queue
-import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 
 from app.errors import Cancelled, UserError
 from app.model.recipe import Recipe
-from app.progress import GRACE, INTERRUPTED, Progress, abandon, interruptible
+from app.progress import GRACE, INTERRUPTED, Progress, abandon, deaf_children, interruptible
 from app.work.export import run
 from app.work.fit_job import Fit
 from app.work.jobs import Job
@@ -124,7 +123,7 @@ class Worker:
     """
 
     def __init__(self, inbox: queue.SimpleQueue[tuple[Worker, Reply]]) -> None:
-        with _deaf_children():
+        with deaf_children():
             self._process = subprocess.Popen(
                 [sys.executable, "-c", SERVING],
                 stdin=subprocess.PIPE,
@@ -171,23 +170,6 @@ class Worker:
             while True:
                 inbox.put((self, pickle.load(said)))
         inbox.put((self, None))
-
-
-@contextmanager
-def _deaf_children() -> Iterator[None]:
-    """Keep Ctrl+C and a hang-up, which reach every process of a terminal, from those that are started in the block.
-
-    They inherit what this thread has blocked, while for itself it only waits until the block ends; a handler that a
-    process sets for itself would come too late for one that is still being started.
-    """
-    if not hasattr(signal, "pthread_sigmask"):  # Windows
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGHUP})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def serve(do: Callable[[Work, Progress], Outcome] = perform) -> None:

@@ -18,7 +18,7 @@ def start() -> None:
             sys.argv = ["-c"]
             exec(code, {"__name__": "__main__"})
         case _:
-            from app.cli import main
+            from app.start import main
 
             main()
 

@@ -72,7 +72,7 @@ def _chosen_gpu() -> int | None:
     said = os.environ.get(GPU, "")
     if not said:
         return None
-    if not said.isdecimal() or len(said) > 5:
+    if not (said.isascii() and said.isdecimal()) or len(said) > 5:
         raise ContextError(f"graphics device {said!r} was asked for; it must be a number from 0 to {MOST_GPUS}")
     if not sys.platform.startswith("linux"):
         raise ContextError(f"graphics device {said} was asked for; on this system its own settings choose the device")

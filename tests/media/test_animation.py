@@ -476,6 +476,25 @@ def test_an_encoder_that_dies_is_quoted(tmp_path: Path, monkeypatch: pytest.Monk
     assert contents(tmp_path) == ["dying"]
 
 
+def test_an_ffmpeg_that_does_not_run_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    (tmp_path / "text").write_text("no program")
+    (tmp_path / "text").chmod(0o755)
+    for name in ("gone", "text", "false"):
+        found = "/bin/false" if name == "false" else str(tmp_path / name)
+        monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", found)
+        with pytest.raises(UserError, match=f"^{found} is no ffmpeg that runs here; set IMAGEIO_FFMPEG_EXE to one"):
+            ffmpeg.executable.__wrapped__()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="asks /proc")
+def test_ctrl_c_does_not_reach_an_ffmpeg_that_is_asked_something(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """It would say half of it, and be taken for one that does not run."""
+    (tmp_path / "ffmpeg").write_text("#!/bin/sh\ncut -d' ' -f6 /proc/$$/stat\n")
+    (tmp_path / "ffmpeg").chmod(0o755)
+    monkeypatch.setattr(ffmpeg, "executable", lambda: str(tmp_path / "ffmpeg"))
+    assert int(ffmpeg.ask().stdout) != os.getsid(0)
+
+
 def test_an_encoder_that_is_killed_says_why(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """By the system, for want of memory as a rule; and by its own write beyond the largest file that is allowed."""
     real, wrapper = ffmpeg.executable(), tmp_path / "wrapper"

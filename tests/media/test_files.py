@@ -15,6 +15,7 @@ from app.media.files import (
     check_kept,
     check_numbers,
     is_sequence,
+    listed,
     name_from,
     number_in,
     numbered,
@@ -65,6 +66,8 @@ def test_files_are_in_the_order_of_their_numbers(tmp_path: Path) -> None:
     assert [*numbered_files(tmp_path / "a.%d.png")] == [9, 10, 100]
     with pytest.raises(UserError, match="there is no such file"):
         numbered_files(tmp_path / "b.%d.png")
+    with pytest.raises(UserError, match=r"there is no folder .*gone; check the name"):
+        numbered_files(tmp_path / "gone" / "f.%d.png")
 
 
 @pytest.mark.parametrize(
@@ -159,3 +162,18 @@ def test_on_a_disk_without_modes_a_file_is_replaced_all_the_same(
 )
 def test_why_a_file_cannot_be_written_is_told_with_what_mends_it(tmp_path: Path, number: int, said: str) -> None:
     assert said in str(cannot_write(tmp_path / "gone" / "a.png", OSError(number, "of its own")))
+
+
+@pytest.mark.parametrize(
+    ("names", "line"),
+    [
+        (["b.png", "a.png"], "b.png, a.png"),
+        ([f"plate.{number}.exr" for number in (1001, 1010, 1002, 1003, 1004)], "plate.1001-1004,1010.exr"),
+        (["f.9.png", "f.10.png", "f.11.png", "g.09.png", "1.mp4"], "f.9-11.png, g.09.png, 1.mp4"),
+        (["2024/a.png", "2025/a.png", "b.png"], "2024-2025/a.png, b.png"),
+        ([f"x{number}.png" for number in range(0, 40, 2)], "x0,2,4,6,8,10,12,14.png and 12 more"),
+        ([f"{letter}.png" for letter in "abcdefghij"], ", ".join(f"{c}.png" for c in "abcdefgh") + " and 2 more"),
+    ],
+)
+def test_names_are_listed_in_a_line(names: list[str], line: str):
+    assert listed(names) == line

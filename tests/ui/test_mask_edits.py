@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from itertools import pairwise
 from pathlib import Path
 
@@ -9,8 +11,11 @@ import numpy as np
 import pytest
 
 from app.errors import UserError
-from app.media.pictures import read_picture
+from app.media.displacement import Displacement
+from app.media.maps import write_map
+from app.media.pictures import read_picture, write_picture
 from app.model.mask_edits import FeatherMask, FillMask, SpreadMask
+from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.ui.actions import ACTIONS
 from app.ui.widgets import Ui
@@ -169,6 +174,20 @@ def test_what_is_not_painted_is_not_saved(robot: Robot, tmp_path: Path) -> None:
     with pytest.raises(UserError, match="nothing on this mask"):
         robot.editor.files.save_mask(tmp_path / "mask.png", "frozen")
     assert not (tmp_path / "mask.png").exists()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="names are text there")
+def test_a_mask_or_a_map_whose_name_no_recipe_could_hold_is_refused(robot: Robot, tmp_path: Path) -> None:
+    folder = tmp_path / os.fsdecode(b"caf\xe9")
+    folder.mkdir()
+    write_picture(folder / "mask.png", Picture(np.full((16, 16, 1), 255, np.uint8)))
+    write_map(folder / "map.npy", Displacement(np.zeros((16, 16, 2), np.float32)))
+    files, said = robot.editor.files, r"Cannot refer to .*: its name is not UTF-8; rename it\."
+    with pytest.raises(UserError, match=said):
+        files.load_mask(folder / "mask.png", "frozen")
+    with pytest.raises(UserError, match=said):
+        files.start_from_map(folder / "map.npy")
+    assert not frozen(robot).any()
 
 
 def test_every_edit_of_a_mask_is_an_action() -> None:

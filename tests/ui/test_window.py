@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -205,6 +206,18 @@ def test_a_minimised_window_with_unsaved_work_comes_back_to_ask(desk: Desk) -> N
     desk.until(lambda: desk.is_shown, "the window")
     assert desk.editor is not None
     assert desk.editor.poll() is None
+
+
+def test_a_window_that_is_interrupted_closes_and_what_was_not_saved_is_offered(desk: Desk, tmp_path: Path) -> None:
+    desk.open_pattern()
+    desk.drag((400, 400), (520, 400))
+    desk.until(lambda: desk.title() == "pattern * - fluidwarp", "the push to be recorded")
+    assert desk.editor is not None
+    desk.editor.send_signal(signal.SIGINT)
+    assert desk.editor.wait(60) == 130
+    (found,), notices = find(tmp_path / "state" / "fluidwarp" / "journals")
+    found.leave()
+    assert (notices, found.work.strokes) == ([], 1)
 
 
 def test_without_a_display_it_says_what_works(tmp_path: Path) -> None:

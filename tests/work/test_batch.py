@@ -223,8 +223,21 @@ def test_the_command_line(folder: Path):
         "fluidwarp: 1 of 3 pictures failed; all others are written",
     ]
     assert sorted(contents(folder / "out")) == ["p0.png", "p1.png"]
-    assert fluidwarp("gone.png", "missing.png", "-o", "new/folder").returncode == 1
+    gone = [*(f"gone.{number}.png" for number in (1001, 1002, 1003, 1010)), "new\nline.png"]
+    ran = fluidwarp(*gone, "-o", "new/folder")
+    assert ran.returncode == 1
+    assert ran.stderr.splitlines() == [
+        f"fluidwarp: Cannot read {folder / gone[0]}: there is no such file; check the name.",
+        r"fluidwarp: 5 of 5 pictures failed: gone.1001-1003,1010.png, new\nline.png; none is written",
+    ]
     assert not (folder / "new").exists()
+    (folder / "empty.png").write_bytes(b"")
+    ran = fluidwarp("gone.png", "p0.png", "empty.png", "-o", "out")
+    named = "gone.png, empty.png; try one of them alone to see why"
+    assert ran.stderr.splitlines()[1:] == [f"fluidwarp: 2 of 3 pictures failed: {named}; all others are written"]
+    ran = fluidwarp("gone.png", "-o", "out")
+    assert ran.returncode == 1
+    assert ran.stderr == f"fluidwarp: Cannot read {folder / 'gone.png'}: there is no such file; check the name.\n"
     ran = fluidwarp("p0.png", "p1.png", "-o", "a.toml/out")
     assert ran.stderr == "fluidwarp: Cannot write a.toml/out: a part of its path is a file; choose another folder.\n"
     ran = fluidwarp("p2.png", "-o", "out")
@@ -621,3 +634,20 @@ def test_a_folder_of_states_is_bounded_and_may_be_full(folder: Path, monkeypatch
     assert "No more states are kept" in outcome.notices[0]
     assert "the disk is full" in outcome.notices[0]
     assert contents(folder / "full") == contents(folder / "out")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="links are made otherwise there")
+def test_a_link_among_states_is_not_followed(folder: Path):
+    """What it leads to may be anything of whoever has put it there, or of whoever renders."""
+    (folder / "b.toml").write_text(f"{next(iter(WORK.values()))}[output]\nfps = 70\n")
+    words = {"first": 0, "last": None, "states": folder / "states"}
+    assert part(folder, "a", **words)[1].error == ""
+    *_, state = sorted((folder / "states").iterdir())
+    (folder / "precious").write_text("of somebody")
+    state.unlink()
+    state.symlink_to(folder / "precious")
+    _, outcome = part(folder, "b", **words)
+    assert outcome.error == ""
+    assert outcome.notices == (f"No more states are kept: {state} is a link; remove it",)
+    assert (folder / "precious").read_text() == "of somebody"
+    assert contents(folder / "a") == contents(folder / "b")

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import random
-from dataclasses import replace
+import zlib
+from dataclasses import asdict, replace
 from itertools import pairwise
+from typing import Any
 
 import pytest
 
@@ -12,6 +15,7 @@ from app.model.recipe import VERSION as RECIPE_VERSION
 from app.model.recipe import Recipe
 from app.model.strokes import Change, Stroke
 from app.model.undo import Entry, History
+from app.work import journal
 from app.work.journal import Damaged, Newer, Origin, Work, beginning, continuation, read
 
 ORIGIN = Origin("Käse 1", "/pictures", None, True, False, 12, 34)
@@ -130,6 +134,109 @@ def test_a_bit_flipped_in_the_beginning_gives_an_earlier_state_or_nothing() -> N
         except (Damaged, Newer):
             continue
         assert [repr(entry.recipe) for entry in found.entries] == states[: len(found.entries)]
+
+
+def line(record: Any) -> bytes:
+    """A record with its checksum, whatever it says."""
+    text = json.dumps(record).encode()
+    return b"%08x %s\n" % (zlib.crc32(text), text)
+
+
+ENTRY = ["Push", 5, {"duration": 3.0}]
+
+
+@pytest.mark.parametrize(
+    "record",
+    [
+        {"index": 0.0},
+        {"index": True},
+        {"index": -1},
+        {"index": "0"},
+        {"index": 0, "saved": [-1, {}]},
+        {"index": 0, "saved": [0.0, {}]},
+        {"index": 0, "saved": [1, {}]},
+        {"index": 0, "drop": -1},
+        {"index": 0, "drop": 1},
+        {"index": 0, "keep": -1, "add": [ENTRY, ENTRY]},
+        {"index": 0, "keep": 9},
+        {"index": 0, "add": [[7, 5, {}]]},
+        {"index": 0, "add": [["a\0", 5, {}]]},
+        {"index": 0, "add": [["a", 5.0, {}]]},
+        {"index": 0, "add": [["a", -5, {}]]},
+        {"index": 0, "add": [["a", 1e300, {}]]},
+        {"index": 0, "add": [["a", 5, {"stroke": [-1, []]}]]},
+        {"index": 0, "add": [["a", 5, {"stroke": [0.0, []]}]]},
+        {"index": 0, "add": [["a", 5, {"stroke": [9, []]}]]},
+        {"index": 0, "add": [["a", 5, {"duration": float("nan")}]]},
+        {"index": 0, "add": [["a", 5, {"duration": -1.0}]]},
+        {"index": 0, "add": [["a", 5, {"duration": "1"}]]},
+        {"index": 0, "add": [["a", 5, {"picture": "a\0"}]]},
+        {"index": 0, "add": [["a", 5, {"edited": 1}]]},
+        {"amend": [1]},
+        {"amend": {"version": 10**400}},
+        {},
+        [],
+        None,
+        7,
+    ],
+    ids=json.dumps,
+)
+def test_a_record_that_says_what_none_can_costs_nothing_before_it(record: Any) -> None:
+    """Though it is whole by its checksum."""
+    recipe = Recipe(picture="a.png")
+    work = Work((Entry("Open", recipe, 0),), 0, recipe)
+    begun = b"".join(beginning(ORIGIN, work))
+    longer = Work((*work.entries, Entry("Longer", recipe.edited(duration=2.0), 9)), 1, recipe)
+    for data, before in (begun, work), (begun + continuation(longer, work), longer):
+        if record in ({"index": 0, "saved": [1, {}]}, {"index": 0, "drop": 1}) and before is longer:
+            continue  # there it can
+        _, found = read(data + line(record) + continuation(longer, work))
+        assert same(found, before)
+        assert found.edits[:2] == (len(before.entries), before.index)
+        assert found.is_unsaved == before.is_unsaved
+        assert found.is_cut
+        assert not read(data)[1].is_cut
+        assert not read(data + line(record)[:-3])[1].is_cut
+
+
+@pytest.mark.parametrize(
+    "part",
+    [
+        {"path": 7},
+        {"path": "/a\0"},
+        {"name": None},
+        {"folder": ["/"]},
+        {"size": -1},
+        {"size": 1.0},
+        {"crc": "7"},
+        {"embedded": 1},
+        {"inside": True},
+        {"more": 1},
+    ],
+    ids=json.dumps,
+)
+def test_a_journal_of_pictures_that_are_nowhere_is_damaged(part: dict[str, Any]) -> None:
+    head, *_ = beginning(ORIGIN, Work((Entry("Open", Recipe(), 0),), 0, Recipe()))
+    first = {"origin": asdict(ORIGIN), "add": [["Open", 0, {}]], "index": 0}
+    assert read(head + line(first))[0] == ORIGIN
+    with pytest.raises(Damaged):
+        read(head + line(first | {"origin": first["origin"] | part}))
+
+
+def test_names_that_are_not_utf8_come_back() -> None:
+    origin = replace(ORIGIN, name="\udcff", folder="/\udcff", path="/\udcff/a")
+    assert read(b"".join(beginning(origin, Work((Entry("Open", Recipe(), 0),), 0, Recipe()))))[0] == origin
+
+
+def test_a_journal_of_more_lists_than_a_history_has_is_read_no_further(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(journal, "DEFAULT_BUDGET", 20_000)
+    recipe = Recipe().edited(stroke=(a_stroke(random.Random(1), 1),) * 100)
+    data = b"".join(beginning(ORIGIN, Work((Entry("Open", recipe, 0),), 0, recipe)))
+    for index in range(1, 1000):
+        data += line({"index": index, "add": [["a", 0, {"stroke": [99, []]}]]})
+    found = read(data)[1]
+    assert sum(1024 + 8 * len(entry.recipe.stroke) for entry in found.entries) <= 40_000
+    assert len(found.entries) > 10
 
 
 @pytest.mark.parametrize("data", [b"", b"\n", b"fluidwarp journal 1 1\n", b"\x89PNG\r\n\x1a\n", b"\0" * 4096])

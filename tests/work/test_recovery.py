@@ -41,6 +41,7 @@ from app.work.session import Session
 from killing import Painter, digest_of, digest_of_warp
 from solver.gl.device import Device
 from support.editing import Robot, pattern, small_project
+from support.permissions import as_a_user, needs_permissions
 from support.widgets import Widgets
 
 
@@ -450,6 +451,19 @@ def test_what_is_no_file_is_told_in_a_sentence_and_nothing_of_it_is_removed(desk
     assert kept.exists()
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="names are text there")
+def test_work_on_a_picture_whose_name_is_not_utf8_is_found(tmp_path: Path) -> None:
+    small_project(tmp_path)
+    picture = tmp_path / os.fsdecode(b"caf\xe9.png")
+    (tmp_path / "pattern.png").rename(picture)
+    desk = Desk(tmp_path / "journals", projects.from_picture(picture))
+    desk.push(2)
+    desk.die()
+    found = found_in(desk.root)
+    assert found.work.strokes == 2
+    assert (found.file, found.load().recipe) == (picture, desk.document.recipe)
+
+
 @pytest.mark.parametrize("is_project", [False, True])
 def test_a_picture_that_is_gone_is_told_and_the_work_kept(desk: Desk, tmp_path: Path, is_project: bool) -> None:
     """By its own name, also where a project names it."""
@@ -530,6 +544,84 @@ def test_a_folder_that_cannot_be_written_is_told_and_tried_again(desk: Desk) -> 
     assert is_all_of(found_in(desk.root), desk.document)
 
 
+def test_what_could_not_be_written_is_tried_again_though_nothing_more_is_done(
+    desk: Desk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(recovery, "AGAIN", 0.05)
+    desk.root.parent.mkdir()
+    desk.root.write_text("a file is in the way")
+    desk.push(2)
+    desk.write()
+    assert desk.journal.trouble is not None
+    desk.root.unlink()
+    until(lambda: desk.journal.trouble is None)
+    desk.die()
+    assert is_all_of(found_in(desk.root), desk.document)
+
+
+def test_what_could_not_be_written_is_tried_again_at_the_end(desk: Desk) -> None:
+    desk.root.parent.mkdir()
+    desk.root.write_text("a file is in the way")
+    desk.push(2)
+    desk.write()
+    assert desk.journal.trouble is not None
+    desk.root.unlink()
+    desk.die()
+    assert is_all_of(found_in(desk.root), desk.document)
+
+
+def test_a_journal_that_is_too_large_is_neither_written_nor_read(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(recovery, "MOST", 2000)
+    whole = 0
+    while desk.journal.trouble is None:
+        whole = len(desk.document.recipe.stroke)
+        desk.push()
+        desk.write()
+    assert whole > 2
+    assert "with all its history it has more than 0 MB; save the work" in desk.journal.trouble
+    desk.die()
+    found = found_in(desk.root)
+    assert found.work.strokes == whole
+    folder = found.held.folder
+    found.leave()
+    assert files_in(folder) == ["lock", recovery.JOURNAL]
+    monkeypatch.setattr(recovery, "MOST", (folder / recovery.JOURNAL).stat().st_size - 1)
+    assert find(desk.root)[1] == [
+        f"The journal of unsaved work in {folder} has more than 0 MB, the most that one may have; it is left there."
+    ]
+    assert files_in(folder) == ["lock", recovery.JOURNAL]
+
+
+def test_work_whose_last_is_damaged_is_found_with_a_sentence(desk: Desk) -> None:
+    desk.push(3)
+    desk.write()
+    desk.die()
+    file = next(desk.root.rglob(recovery.JOURNAL))
+    *lines, third, fourth = file.read_bytes().splitlines(keepends=True)
+    file.write_bytes(b"".join([*lines, third.replace(b"push", b"hush"), fourth]))
+    (found,), notices = find(desk.root)
+    assert notices == ["The last of the unsaved work on “pattern” is damaged; what came before it can be restored."]
+    assert 0 < found.work.strokes < 3
+    found.leave()
+
+
+def test_work_that_no_recipe_may_hold_is_told_and_kept(desk: Desk) -> None:
+    """Each of its parts is valid in itself; together they would be a hundred million ticks."""
+    desk.push()
+    now = desk.document.recipe
+    fluid = now.fluid.model_copy(update={"dt": 0.001})
+    desk.document.history.commit("Long", now.edited(duration=1e6, fluid=fluid))
+    desk.keep()
+    desk.die()
+    found = found_in(desk.root)
+    with pytest.raises(
+        UserError, match=r"“pattern”: 'duration' .* ticks; make dt larger\. The work is left as it is, in"
+    ):
+        found.load()
+    found.leave()
+    assert is_all_of(found_in(desk.root), desk.document)
+
+
 @pytest.mark.parametrize("gone", ["the journal", "its folder", "all journals"])
 def test_a_journal_that_is_taken_away_is_begun_anew(desk: Desk, gone: str) -> None:
     desk.push(2)
@@ -554,6 +646,7 @@ def test_on_a_disk_without_locks_nothing_is_left(desk: Desk, monkeypatch: pytest
     desk.push(2)
     desk.write()
     assert desk.journal.trouble is not None
+    desk.die()
     assert files_in(desk.root) == []
 
 
@@ -579,6 +672,38 @@ for number in range(30):
     assert 3 < well < 30
     assert "cannot be written" in told[-1][1]
     assert found_in(tmp_path / "journals").work.strokes >= well
+
+
+@needs_permissions
+def test_a_folder_of_journals_that_is_read_only_is_told_and_written_once_it_is_not(tmp_path: Path) -> None:
+    (tmp_path / "journals").mkdir(mode=0o555)
+    code = """
+from pathlib import Path
+from work.test_recovery import Desk, recovery, small_project, until
+recovery.AGAIN = 0.05
+root = Path("journals").resolve()
+desk = Desk(root, small_project(Path.cwd()))
+desk.push(2)
+desk.write()
+print(desk.journal.trouble)
+print(recovery.find(root))
+root.chmod(0o755)
+until(lambda: desk.journal.trouble is None)
+root.chmod(0o111)
+print(recovery.find(root))
+root.chmod(0o755)
+desk.die()
+"""
+    done = as_a_user(code, tmp_path)
+    assert done.stderr == ""
+    root = tmp_path / "journals"
+    assert done.stdout.splitlines() == [
+        f"If fluidwarp crashes, what is not saved is lost: the journal in {root} cannot be written (no permission; "
+        "change its permissions).",
+        "([], [])",
+        f"([], ['The journal of unsaved work in {root} cannot be read (Permission denied); it is left there.'])",
+    ]
+    assert found_in(root).work.strokes == 2
 
 
 # In the window -------------------------------------------------------------------------------------------------------

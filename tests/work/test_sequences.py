@@ -13,9 +13,11 @@ import numpy as np
 import OpenEXR
 import pytest
 
+from app.errors import UserError
 from app.media.displacement import Displacement
 from app.media.maps import write_map
 from app.media.pictures import read_picture, write_picture
+from app.media.record import Record
 from app.media.source import open_source
 from app.model.picture import Picture
 from support.commands import Run
@@ -210,6 +212,50 @@ def test_a_damaged_record_costs_no_more_than_the_work(folder: Path, fluidwarp: R
     ran = fluidwarp(folder, *words, "--resume")
     assert ran.stderr == "fluidwarp: 1 of 4 frames were whole and are kept\n"
     assert fluidwarp(folder, *words, "--resume").stderr == "fluidwarp: 4 of 4 frames were whole and are kept\n"
+    os.truncate(record, 300 * 2**20)
+    line = f"fluidwarp: Cannot read {record.name}: it has more than 256 MB; remove it.\n"
+    assert fluidwarp(folder, *words, "--resume").stderr == line
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="links and pipes are made otherwise there")
+@pytest.mark.parametrize("what", ["link", "link to nothing", "pipe", "folder"])
+@pytest.mark.parametrize("more", [[], ["--resume"]], ids=" ".join)
+def test_what_is_put_in_the_place_of_a_record_is_neither_followed_nor_waited_for(
+    folder: Path, fluidwarp: Run, what: str, more: list[str]
+):
+    words = ["render", "a.toml", "plate.%04d.exr", "-o", "f.%04d.exr", *more]
+    assert fluidwarp(folder, *words).returncode == 0
+    (record,) = folder.glob(".fluidwarp-frames-*")
+    record.unlink()
+    for frame in folder.glob("f.*.exr"):
+        frame.unlink()
+    (folder / "precious.txt").write_text("of somebody")
+    if what == "pipe":
+        os.mkfifo(record)
+    elif what == "folder":
+        record.mkdir()
+    else:
+        record.symlink_to("precious.txt" if what == "link" else "nothing")
+    before = sorted(path.name for path in folder.iterdir())
+    ran = fluidwarp(folder, *words)
+    told = "a link" if "link" in what else "no ordinary file"
+    line = f"fluidwarp: Cannot write {record.name}: it is {told}; remove it, or write to another folder.\n"
+    assert (ran.returncode, ran.stderr) == (1, line)
+    assert sorted(path.name for path in folder.iterdir()) == before
+    assert (folder / "precious.txt").read_text() == "of somebody"
+
+
+def test_a_record_that_becomes_a_link_while_frames_are_written_is_not_followed(tmp_path: Path):
+    record = Record(tmp_path / "f.%d.png", str)
+    (tmp_path / "f.1.png").write_bytes(b"1")
+    record.add(1)
+    (path,) = tmp_path.glob(".fluidwarp-frames-*")
+    path.rename(tmp_path / "precious")
+    path.symlink_to("precious")
+    before = (tmp_path / "precious").read_bytes()
+    with pytest.raises(UserError, match=r"fluidwarp-frames-\w+: it is a link; remove it"):
+        record.add(1)
+    assert (tmp_path / "precious").read_bytes() == before
 
 
 def test_a_picture_there_and_back_and_its_maps_go_on(folder: Path, fluidwarp: Run):
