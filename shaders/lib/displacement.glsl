@@ -15,9 +15,11 @@ vec2 cell_at(vec2 p, vec2 size, float reach, vec4 images) {
 // Along one axis, where the texels lie whose images those `at` these places are, and how often they count: of the component
 // across the edges, and of that along them.
 vec4 imaged(vec4 at, float count, vec2 images, out vec4 across, out vec4 along) {
-    across = sign(at) * sign(count - at);
-    along = mix(mix(vec4(1.0), vec4(images.x), lessThan(at, vec4(0.0))), vec4(images.y), greaterThan(at, vec4(count)));
-    return count - abs(count - abs(at));
+    vec4 place = count - abs(count - abs(at));
+    bvec4 inside = equal(place, at);
+    across = mix(vec4(-1.0), vec4(1.0), inside);
+    along = mix(vec4(at.x < 0.0 ? images.x : images.y), vec4(1.0), inside);
+    return place;
 }
 
 // Between the four next texels. 4 reads.
@@ -38,11 +40,13 @@ vec4 cubic_texels(sampler2D displacement, vec2 p, vec4 images) {
     vec2 lx = vec2(1.0 - f.x, f.x), ly = vec2(1.0 - f.y, f.y), bend = cx.yz - lx;
     vec4 x = imaged(cell.x + vec4(-0.5, 0.5, 1.5, 2.5), size.x, images.xy, ux, vx) * texel.x;
     vec4 y = imaged(cell.y + vec4(-0.5, 0.5, 1.5, 2.5), size.y, images.zw, vy, uy) * texel.y;
-#define AT(i, j) texture(displacement, vec2(x[i], y[j])) * vec4(ux[i] * uy[j], vx[i] * vy[j], 1.0, 1.0)
-    return (cy.y * lx.x + ly.x * bend.x) * AT(1, 1) + (cy.y * lx.y + ly.x * bend.y) * AT(2, 1)
-         + (cy.z * lx.x + ly.y * bend.x) * AT(1, 2) + (cy.z * lx.y + ly.y * bend.y) * AT(2, 2)
-         + ly.x * (cx.x * AT(0, 1) + cx.w * AT(3, 1)) + ly.y * (cx.x * AT(0, 2) + cx.w * AT(3, 2))
-         + cy.x * (lx.x * AT(1, 0) + lx.y * AT(2, 0)) + cy.w * (lx.x * AT(1, 3) + lx.y * AT(2, 3));
+#define AT(i, j) texture(displacement, vec2(x[i], y[j])) * vec4(ux[i], vx[i], 1.0, 1.0)
+#define ROW(j) vec4(uy[j], vy[j], 1.0, 1.0)
+    return ROW(1) * ((cy.y * lx.x + ly.x * bend.x) * AT(1, 1) + (cy.y * lx.y + ly.x * bend.y) * AT(2, 1))
+         + ROW(2) * ((cy.z * lx.x + ly.y * bend.x) * AT(1, 2)) + ROW(2) * ((cy.z * lx.y + ly.y * bend.y) * AT(2, 2))
+         + ROW(1) * (ly.x * (cx.x * AT(0, 1) + cx.w * AT(3, 1))) + ROW(2) * (ly.y * (cx.x * AT(0, 2) + cx.w * AT(3, 2)))
+         + ROW(0) * (cy.x * (lx.x * AT(1, 0) + lx.y * AT(2, 0))) + ROW(3) * (cy.w * (lx.x * AT(1, 3) + lx.y * AT(2, 3)));
+#undef ROW
 #undef AT
 }
 
@@ -122,8 +126,8 @@ vec4 quintic_texels(sampler2D displacement, vec2 p, vec4 images) {
     for (int j = 0; j < 6; ++j)
         for (int i = 0; i < 6; ++i) {
             int a = i / 3, b = j / 3, m = i % 3, n = j % 3;
-            vec4 counts = vec4(ux[a][m] * uy[b][n], vx[a][m] * vy[b][n], 1.0, 1.0);
-            sum += wx[i] * wy[j] * texture(displacement, vec2(x[a][m], y[b][n])) * counts;
+            vec4 across = wx[i] * vec4(ux[a][m], vx[a][m], 1.0, 1.0), down = wy[j] * vec4(uy[b][n], vy[b][n], 1.0, 1.0);
+            sum += across * down * texture(displacement, vec2(x[a][m], y[b][n]));
         }
     return sum;
 }
