@@ -24,7 +24,7 @@ from solver.grid import Grid
 from solver.limits import check_finite, check_size, check_step, check_type, numbers, places, real_array
 from solver.params import Walls
 from solver.state import State
-from solver.trace import Tracing
+from solver.trace import MOST_PARTS, Tracing
 from solver.warp.accumulated import LEAST_TEXELS, AccumulatedMap
 from solver.warp.distortion import MapStatistics, distortion
 from solver.warp.factors import Factors
@@ -32,7 +32,7 @@ from solver.warp.frozen import Frozen
 from solver.warp.prescribed import traced
 from solver.warp.remapping import Remapping
 from solver.warp.state import ACCUMULATED, FACTOR, OPEN, SIZES, SUBMAPS, Images, MapState, grid_in, images_in, values_of
-from solver.warp.submap import Level, Submap, away_from_held, defines_of, images_of, inputs_of, window_of
+from solver.warp.submap import STEEPEST, Level, Submap, away_from_held, defines_of, images_of, inputs_of, window_of
 
 CHECK_EVERY = 2  # steps between two looks at how far the map is bent: a quick push bends it by 1 in two
 MOST_PLACES = 2**19  # at which its distortion is looked at
@@ -114,11 +114,17 @@ class WarpMap:
     # -- moving it --------------------------------------------------------------------------------------------------
 
     def follow(self, fluid: Fluid, dt: float) -> None:
-        """Carry the map `dt` seconds by a fluid, along the trace that the fluid's own next step follows too."""
+        """Carry the map `dt` seconds by a fluid, along the trace that the fluid's own next step follows too.
+
+        In parts, if the submap would be bent too far in one, so that each may end with a remap.
+        """
         check_type("what the map is to follow", fluid, Fluid)
         if fluid.grid != self.grid:
             raise ValueError(f"a map on {self.grid} cannot follow a fluid on {fluid.grid}; `move_to` takes it there")
-        self._advance(fluid.begin_trace(check_step(dt)) or fluid.trace(dt), fluid.params.walls)
+        strain = fluid.strain(check_step(dt))
+        parts = math.ceil(min(strain / STEEPEST, MOST_PARTS)) if strain > STEEPEST else 1
+        for _ in range(parts):
+            self._advance(fluid.begin_trace(dt / parts) or fluid.trace(dt / parts), fluid.params.walls, parts > 1)
 
     def advance(self, velocity: Field, dt: float) -> None:
         """Carry the map one step by a velocity on the MAC grid, constant over the step: second-order backtrace."""
@@ -134,8 +140,8 @@ class WarpMap:
         check_field("a trace", trace, self.grid)
         self._advance(trace)
 
-    def _advance(self, trace: Field | Tracing, walls: Walls | None = None) -> None:
-        """Make a step between walls, and go on with a remap, or begin one if it is time."""
+    def _advance(self, trace: Field | Tracing, walls: Walls | None = None, looks: bool = False) -> None:
+        """Make a step between walls, and go on with a remap, or begin one if it is time: `looks` at once whether."""
         images = images_of(walls or Walls(), self.grid)
         if images != self._submap.images:
             self._begin_remap()
@@ -145,7 +151,7 @@ class WarpMap:
         self._changed()
         self._remapping.advance(self.grid)
         # Reading the steepness waits for the GPU, so not at every step; at fixed ones, so that a replay remaps alike.
-        looks = self._steps % CHECK_EVERY == 0
+        looks = looks or self._steps % CHECK_EVERY == 0
         if self._steps >= self.remap_every or (looks and (not self._is_settled or self._submap.is_steep)):
             self._begin_remap()
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from properties.handles import check_lines
-from properties.led import check_handles_beside_frozen, check_handles_fold_nothing
+from properties.led import check_handles_beside_frozen, check_handles_fold_nothing, check_quick_push
 from solver import Device
 
 
@@ -22,3 +22,8 @@ def test_handles_in_a_recipe_fold_nothing(seed: int, device: Device):
 @pytest.mark.parametrize("seed", [0, 34])  # that folded in the last half cell before the picture's edge
 def test_handles_beside_a_small_frozen_disc_at_the_edge_fold_nothing(seed: int, device: Device):
     check_handles_beside_frozen(device, seed)
+
+
+@pytest.mark.parametrize("seed", [33, 34, 35])  # that folded while a tick was one step of the map
+def test_a_push_of_more_than_a_radius_a_tick_folds_nothing(seed: int, device: Device):
+    check_quick_push(device, seed)

@@ -103,6 +103,30 @@ def test_vortex_comes_back(device: Device) -> None:
     assert np.abs(np.hypot(found[:, 0] - 0.5, found[:, 1] - 0.75) - 0.15).max() < 5e-5
 
 
+def test_a_step_that_bends_far_is_carried_in_parts(device: Device) -> None:
+    """Each may end with a remap: a swirl by one and a half radians in one step is as exact as its trace."""
+    grid = Grid(48, 48)
+    fluid, warp = Fluid(device, grid), WarpMap(device, grid)
+
+    def turning(x: np.ndarray, y: np.ndarray, _: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        x, y = x - 0.5, y - 0.5
+        rate = 6 * np.exp(-(x**2 + y**2) / 0.02)
+        return -y * rate, x * rate
+
+    fluid.set_velocity(turning)
+    assert fluid.strain(0.25) > 2
+    warp.follow(fluid, 0.25)
+    assert warp.statistics().det_min > 0.9
+    points = np.random.default_rng(0).random((2000, 2))
+    true = np.stack(reference.follow(turning, *points.T, 0.25, 0.0, 50), axis=-1)
+    off = np.linalg.norm(points + warp.at(points) - true, axis=-1)
+    assert off.max() < 0.1 * grid.h
+    still = fluid.trace(0.25).get()  # that the fluid's own next step follows is still of all of it
+    assert np.abs(still).max() > 3
+    for thing in (fluid, warp):
+        thing.release()
+
+
 def test_small_steps_do_not_blur(device: Device) -> None:
     """A quarter of the vortex's path in steps of CFL 0.1, where interpolating every step would blur most."""
     grid = Grid(48, 48)
