@@ -105,7 +105,7 @@ Bend bend_at(vec2 x) {
     vec2 density = vec2(textureSize(u_accumulated, 0)) / u_picture;
     // Not on a texel that is held by itself: its slopes would be those to others, which are not kept.
     if (texture(u_held, x / u_picture).r > 0.9) {
-        bend.moved = cubic_displacement(u_kept, on_texel(x * density), u_edges, slope);
+        bend.moved = cubic_displacement(u_kept, on_texel(x * density), abs(u_edges), slope);
         bend.jacobian = mat2(1.0) + mat2(slope[0] * density.x, slope[1] * density.y);
         bend.determinant = bend.between = determinant(bend.jacobian);
         return bend;

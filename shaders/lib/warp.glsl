@@ -168,8 +168,9 @@ bool is_held(vec2 place) {
     return held > (on_texel(place) == floor(place) + 0.5 ? 0.5 : 0.9);
 }
 
-// What it is there: u_kept on a texel, and between texels the cubic, which reaches none that moves.
-vec2 held_displacement(vec2 place) { return cubic_displacement(u_kept, on_texel(place), u_edges); }
+// What it is there: u_kept on a texel, and between texels the cubic, which reaches none that moves. Along edges it glides
+// whatever A does from then on, so that every bit stays.
+vec2 held_displacement(vec2 place) { return cubic_displacement(u_kept, on_texel(place), abs(u_edges)); }
 #endif
 
 // A, a closed map or what is undone, at a place in its texels: by the cubic with CUBIC, bilinearly with LINEAR, else by the

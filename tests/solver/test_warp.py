@@ -50,7 +50,7 @@ def test_one_step_agrees_with_float64(device: Device, size: tuple[int, int], sli
     grid = Grid(*size)
     fluid, warp = Fluid(device, grid, FluidParams(walls=Walls(slip))), WarpMap(device, grid)
     fluid.set_velocity(reference.smooth_velocity(*size, seed=5, cells=2.0))
-    submap, dt = smooth(rng, size, 0.1), 2.0 * grid.h
+    submap, dt = smooth(rng, size, 0.1), 0.7 * grid.h
     warp.submap.field.set(submap)
     warp.follow(fluid, dt)
     side = 1 if slip == "free" else -1
@@ -727,6 +727,27 @@ def test_a_window_carries_what_the_whole_picture_carries(device: Device) -> None
     outside = np.ones((256, 384), bool)
     outside[32:224, 80:240] = False
     assert not some[outside].any()
+
+
+def test_at_the_inner_sides_of_a_window_the_map_has_no_step(device: Device) -> None:
+    """What moves along them has come to rest there; at the picture's edge it glides on."""
+    cells = window(Grid(32, 32), 8, 0, 16, 16)
+    fluid, warp = Fluid(device, cells), WarpMap(device, cells, (128, 128))
+    x, y = (np.arange(17) / 16 for _ in range(2))
+    stream = 0.2 * np.sin(np.pi * x)[None] * np.sin(np.pi * y)[:, None]
+    fluid.set_velocity(32 * np.stack([np.diff(stream, axis=0)[:, :-1], -np.diff(stream, axis=1)[:-1]], axis=-1))
+    for _ in range(12):
+        warp.follow(fluid, 1 / 600)
+    (left, top), (width, height) = cells.origin, cells.extent
+    along = np.linspace(0.02, 0.98, 33)
+    inner = [(0 * along + left, top + height * along), (0 * along + left + width, top + height * along)]
+    inner += [(left + width * along, 0 * along + top + height)]
+    for side in inner:
+        assert np.abs(warp.at(np.stack(side, axis=-1))).max() < 1e-6
+    edge = warp.at(np.stack([left + width * along, 0 * along], axis=-1))
+    assert np.abs(edge[:, 0]).max() > 0.005
+    for thing in (fluid, warp):
+        thing.release()
 
 
 def wound_up(device: Device, time: float) -> WarpMap:
