@@ -193,6 +193,10 @@ class Fluid(Scheme):
                 self.device.pass_("step/trace.frag", **tracing.defines)(tracing.target, **tracing.inputs)
         return self._trace.field
 
+    def strain(self, dt: float) -> float:
+        """How much `carrier` bends in `dt` seconds what it carries, dt max |grad w|; waits for the GPU."""
+        return self._trace.strain(self.faces() if self.local.is_empty else self.carrier(), dt, self.grid)
+
     def begin_trace(self, dt: float) -> Tracing | None:
         """What it takes to draw the trace of `carrier`, for a pass that draws it together with something else.
 

@@ -56,6 +56,11 @@ class Walls:
         return tuple(speed if sticks else 0.0 for speed, sticks in zip(self.speed, self.no_slip, strict=False))
 
     @property
+    def images(self) -> tuple[float, ...]:
+        """The signs of the tangential velocity's images beyond the left, right, top and bottom wall."""
+        return tuple(-1.0 if side else 1.0 for side in self.no_slip[:4])
+
+    @property
     def defines(self) -> dict[str, Any]:
         """The defines of `lib/walls.glsl`."""
         return {"NO_SLIP": 1} if any(self.no_slip) else {}
@@ -65,7 +70,7 @@ class Walls:
         """The uniforms of `lib/walls.glsl`."""
         if not any(self.no_slip):
             return {}
-        return {"wall_speed": self.speed, "wall_image": tuple(-1.0 if side else 1.0 for side in self.no_slip[:4])}
+        return {"wall_speed": self.speed, "wall_image": self.images}
 
     def __post_init__(self) -> None:
         if self.slip not in ("free", "none"):

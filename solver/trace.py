@@ -52,13 +52,17 @@ class Trace:
         hx, hy = grid.spacing
         defines, inputs = walls.defines, {"velocity": velocity, "cells_a_speed": (dt / hx, dt / hy), **walls.inputs}
         if in_parts:
-            strain = dt * math.sqrt(self._steepness.of(velocity, grid.spacing))
+            strain = self.strain(velocity, dt, grid)
             if not math.isfinite(strain):
                 raise ValueError("the motion that carries the picture is too fast")
             defines = defines | {"PARTS": 1}
             inputs["parts"] = float(min(max(math.ceil(strain / STRAIN), 1), MOST_PARTS))
         self._dt = dt
         return Tracing(self.field, defines, inputs)
+
+    def strain(self, velocity: Field, dt: float, grid: Grid) -> float:
+        """The largest gradient of a velocity on MAC faces, times `dt`; waits for the GPU."""
+        return dt * math.sqrt(self._steepness.of(velocity, grid.spacing))
 
     def forget(self) -> None:
         """Say that the velocity has changed."""

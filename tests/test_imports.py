@@ -65,7 +65,7 @@ SOLVER = {
         *("gl", "limits", "grid", "params", "packing", "pressure", "viscosity"),
         *("state", "faces", "scheme", "flow", "steepness", "trace", "advection", "energy"),
     },
-    "warp": {"gl", "limits", "grid", "state", "faces", "scheme", "steepness", "trace", "fluid"},
+    "warp": {"gl", "limits", "grid", "params", "state", "faces", "scheme", "steepness", "trace", "fluid"},
     "paper": {"gl", "limits", "grid", "params", "faces", "scheme", "warp"},
     "brush": {"gl", "course", "limits", "grid", "state", "faces", "scheme", "warp"},
     "resample": {"gl", "warp"},

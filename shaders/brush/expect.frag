@@ -21,5 +21,5 @@ void main() {
         grown = u_cells_a_speed.x * (mac_velocity(u_velocity, halfway + across).x - mac_velocity(u_velocity, halfway - across).x)
               + u_cells_a_speed.y * (mac_velocity(u_velocity, halfway + down).y - mac_velocity(u_velocity, halfway - down).y);
     }
-    out_expected = cubic_texels(u_expected, place + back / u_scale, 0.0).r - grown;
+    out_expected = cubic_texels(u_expected, place + back / u_scale, vec4(0.0)).r - grown;
 }

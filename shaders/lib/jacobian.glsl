@@ -28,18 +28,18 @@ float area_of(vec2 corners[4]) {
 }
 
 // What a submap does at x + moved, with its weight w.
-void bend_by(int level, sampler2D submap, vec4 window, vec2 x, inout Bend bend) {
+void bend_by(int level, sampler2D submap, vec4 window, vec4 images, vec2 x, inout Bend bend) {
     vec2 place = x + bend.moved, size = vec2(textureSize(submap, 0)), density = size / window.zw;
     vec2 texel = u_picture / vec2(textureSize(u_accumulated, 0));
     vec3 at = in_window(window, place);
     mat2 slope;
     vec2 fading, corners[4];
     float w = weight(level, submap, window, place, fading);
-    cubic_corners(submap, at.xy * size, texel * density, u_walled, corners);
+    cubic_corners(submap, at.xy * size, texel * density, abs(u_edges) * images, corners);
     for (int k = 0; k < 4; ++k) corners[k] *= at.z * (w + dot(fading, vec2(k % 2, k / 2))) / texel;
     bend.between *= area_of(corners);
     fading /= texel;
-    vec2 more = cubic_displacement(submap, at.xy * size, u_walled, slope);
+    vec2 more = cubic_displacement(submap, at.xy * size, abs(u_edges) * images, slope);
     bend.moved = within_picture(x, bend.moved + w * more * at.z);
     mat2 next = mat2(1.0) + at.z * (w * mat2(slope[0] * density.x, slope[1] * density.y) + outerProduct(more, fading));
     bend.determinant *= determinant(next);
@@ -54,7 +54,7 @@ float follow(sampler2D accumulated, vec2 x, inout Bend bend) {
     bend.from = bend.moved;
     bend.before = bend.jacobian;
 #endif
-    bend.moved += cubic_displacement(accumulated, (x + bend.moved) * density, u_walled, slope);
+    bend.moved += cubic_displacement(accumulated, (x + bend.moved) * density, u_edges, slope);
     mat2 next = mat2(1.0) + mat2(slope[0] * density.x, slope[1] * density.y);
     bend.jacobian = next * bend.jacobian;
     float own = determinant(next);
@@ -79,7 +79,7 @@ void follow_closed(sampler2D closed, vec2 x, inout Bend bend) {
 void undo(sampler2D undone, vec2 x, inout Bend bend) {
     vec2 density = vec2(textureSize(undone, 0)) / u_picture;
     mat2x4 slopes;
-    vec4 read = cubic_texels(undone, (x + bend.from) * density, u_walled, slopes);
+    vec4 read = cubic_texels(undone, (x + bend.from) * density, u_edges, slopes);
     slopes = mat2x4(slopes[0] * density.x, slopes[1] * density.y) * bend.before;
     mat2 aside = mat2(slopes[0].rg, slopes[1].rg), bent = bend.jacobian - mat2(1.0);
     vec2 growing = vec2(slopes[0].b, slopes[1].b) * float(read.b > 0.0 && read.b < 1.0);
@@ -105,7 +105,7 @@ Bend bend_at(vec2 x) {
     vec2 density = vec2(textureSize(u_accumulated, 0)) / u_picture;
     // Not on a texel that is held by itself: its slopes would be those to others, which are not kept.
     if (texture(u_held, x / u_picture).r > 0.9) {
-        bend.moved = cubic_displacement(u_kept, on_texel(x * density), 0.0, slope);
+        bend.moved = cubic_displacement(u_kept, on_texel(x * density), abs(u_edges), slope);
         bend.jacobian = mat2(1.0) + mat2(slope[0] * density.x, slope[1] * density.y);
         bend.determinant = bend.between = determinant(bend.jacobian);
         return bend;
@@ -119,12 +119,12 @@ Bend bend_at(vec2 x) {
 #endif
     bend.jacobian = mat2(1.0);
     bend.determinant = bend.between = 1.0;
-    bend_by(1, u_submap, u_window, x, bend);
+    bend_by(1, u_submap, u_window, u_images, x, bend);
 #if LEVELS > 1
-    bend_by(2, u_second, u_second_window, x, bend);
+    bend_by(2, u_second, u_second_window, u_second_images, x, bend);
 #endif
 #if LEVELS > 2
-    bend_by(4, u_third, u_third_window, x, bend);
+    bend_by(4, u_third, u_third_window, u_third_images, x, bend);
 #endif
     follow_accumulated(x, bend);
 #if UNDONE > 0

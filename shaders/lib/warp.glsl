@@ -6,27 +6,31 @@
 //   texels are: between them a polynomial exceeds them, and composed again and again that would grow without end.
 // u_submap, u_second, u_third, u_accumulated, u_closed_0 to u_closed_8: displacements, longer sides, and of what is undone
 // the part, 0-1, in the third component; u_window, u_second_window, u_third_window: left, top, width and height that the
-// submaps cover, u_picture: width and height of the picture, u_limits: left, top, right, bottom, longer sides; u_walled: 1
-// if neither what has moved nor A or a closed map crosses the picture's edges, else 0.
+// submaps cover, u_picture: width and height of the picture, u_limits: left, top, right, bottom, longer sides; u_images,
+// u_second_images, u_third_images: what lies beyond the windows' sides, u_edges: beyond the picture's, of A and of closed
+// maps, as in lib/displacement.glsl; 0 if something has crossed them, and then nothing has images.
 // Define HELD if something is frozen, for u_held and u_kept, over A's texels: see is_held. Define WEIGHED for the submaps
 // that are carried less and less before that, 1, 2 and 4 or their sum, and FADED: see weight.
 #include "lib/displacement.glsl"
 uniform sampler2D u_submap;
 uniform sampler2D u_accumulated;
 uniform vec4 u_window;
+uniform vec4 u_images;
 uniform vec2 u_picture;
 uniform vec4 u_limits;
-uniform float u_walled;
+uniform vec4 u_edges;
 #ifndef LEVELS
 #define LEVELS 1
 #endif
 #if LEVELS > 1
 uniform sampler2D u_second;
 uniform vec4 u_second_window;
+uniform vec4 u_second_images;
 #endif
 #if LEVELS > 2
 uniform sampler2D u_third;
 uniform vec4 u_third_window;
+uniform vec4 u_third_images;
 #endif
 #ifndef CLOSED
 #define CLOSED 0
@@ -132,20 +136,21 @@ float weight(int level, sampler2D submap, vec4 window, vec2 x, out vec2 slope) {
 }
 #endif
 
-vec2 displacement_of(int level, sampler2D submap, vec4 window, vec2 x) {
+vec2 displacement_of(int level, sampler2D submap, vec4 window, vec4 images, vec2 x) {
     vec2 slope;
     vec3 at = in_window(window, x);
-    return cubic_displacement(submap, at.xy * vec2(textureSize(submap, 0)), u_walled) * at.z * weight(level, submap, window, x, slope);
+    vec2 moved = cubic_displacement(submap, at.xy * vec2(textureSize(submap, 0)), abs(u_edges) * images);
+    return moved * at.z * weight(level, submap, window, x, slope);
 }
 
 // Where the submaps lead from x.
 vec2 displacement_of_submaps(vec2 x) {
-    vec2 moved = within_picture(x, displacement_of(1, u_submap, u_window, x));
+    vec2 moved = within_picture(x, displacement_of(1, u_submap, u_window, u_images, x));
 #if LEVELS > 1
-    moved = within_picture(x, moved + displacement_of(2, u_second, u_second_window, x + moved));
+    moved = within_picture(x, moved + displacement_of(2, u_second, u_second_window, u_second_images, x + moved));
 #endif
 #if LEVELS > 2
-    moved = within_picture(x, moved + displacement_of(4, u_third, u_third_window, x + moved));
+    moved = within_picture(x, moved + displacement_of(4, u_third, u_third_window, u_third_images, x + moved));
 #endif
     return moved;
 }
@@ -163,8 +168,9 @@ bool is_held(vec2 place) {
     return held > (on_texel(place) == floor(place) + 0.5 ? 0.5 : 0.9);
 }
 
-// What it is there: u_kept on a texel, and between texels the cubic, which reaches none that moves.
-vec2 held_displacement(vec2 place) { return cubic_displacement(u_kept, on_texel(place), 0.0); }
+// What it is there: u_kept on a texel, and between texels the cubic, which reaches none that moves. Along edges it glides
+// whatever A does from then on, so that every bit stays.
+vec2 held_displacement(vec2 place) { return cubic_displacement(u_kept, on_texel(place), abs(u_edges)); }
 #endif
 
 // A, a closed map or what is undone, at a place in its texels: by the cubic with CUBIC, bilinearly with LINEAR, else by the
@@ -173,9 +179,9 @@ vec4 accumulated_texels(sampler2D accumulated, vec2 place) {
 #if defined(LINEAR)
     return linear_texels(accumulated, place);
 #elif defined(CUBIC)
-    return cubic_texels(accumulated, place, u_walled);
+    return cubic_texels(accumulated, place, u_edges);
 #else
-    return quintic_texels(accumulated, place, u_walled);
+    return quintic_texels(accumulated, place, u_edges);
 #endif
 }
 

@@ -1,6 +1,6 @@
 // Advance: S'(x) = (x_d - x) + S(x_d), the submap's displacement carried one step by the fluid (characteristic mapping
 // method, equation S4 of solver/README.md; paper section 4.1, eq. (5) without diffusion); x + S'(x) stays in the grid.
-// u_displacement (S): cell centres, longer sides; u_spacing: sides of a cell, longer sides; u_walled: see lib/displacement.glsl; u_trace: x_d - x, cells.
+// u_displacement (S): cell centres, longer sides; u_spacing: sides of a cell, longer sides; u_images: see lib/displacement.glsl; u_trace: x_d - x, cells.
 // With INNER the grid is a window, and over the last FADING cells before a side that is not the picture's edge (1 in
 // u_inner: left, right, top, bottom) it is carried less and less, so that there is no step in the map at the side.
 // With TRACE the trace is not given but drawn beside it, for the fluid's next step: inputs of step/trace.frag.
@@ -17,7 +17,7 @@ in vec2 v_uv;
 #endif
 uniform sampler2D u_displacement;
 uniform vec2 u_spacing;
-uniform float u_walled;
+uniform vec4 u_images;
 layout(location = 0) out vec2 out_displacement;
 
 #ifdef INNER
@@ -40,6 +40,6 @@ void main() {
     vec2 back = texture(u_trace, v_uv).rg;
 #endif
     back *= carried(p, size);
-    vec2 displacement = back + cubic_displacement(u_displacement, p + back, u_walled) / u_spacing;
+    vec2 displacement = back + cubic_displacement(u_displacement, p + back, u_images) / u_spacing;
     out_displacement = u_spacing * clamp(displacement, -p, size - p);
 }

@@ -1,6 +1,6 @@
 // Follow factor: E(x) = P(x) + a F(x + P(x)), a displacement led on by a part a of a factor F; x + E(x) stays in the picture.
 // u_factor (F): over the whole picture, longer sides; u_moved (P): texel for texel, or 0 with FIRST; u_amount (a);
-// u_picture: its width and height, longer sides; x: see lib/place.glsl.
+// u_picture: its width and height, longer sides; u_edges: see lib/warp.glsl; x: see lib/place.glsl.
 // Define SUBMAP for the factor to be led by, at each of its texels, what has moved since: u_submap on the window u_window.
 // reads: 13, and 12 more with SUBMAP
 #include "lib/warp.glsl"
@@ -22,5 +22,5 @@ void main() {
     moved = within_picture(x, texture(u_moved, v_uv).rg);
 #endif
     vec2 place = (x + moved) / u_picture * vec2(textureSize(u_factor, 0));
-    out_displacement = within_picture(x, moved + u_amount * cubic_displacement(u_factor, place, 0.0));
+    out_displacement = within_picture(x, moved + u_amount * cubic_displacement(u_factor, place, u_edges));
 }

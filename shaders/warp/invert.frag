@@ -20,7 +20,7 @@ void main() {
     for (int round = 0; round < ROUNDS; ++round) {
         mat2 slope;
         // What is left over, without the rounding of the places themselves.
-        vec2 rest = found + cubic_displacement(u_displacement, (target + found) * density, 0.0, slope);
+        vec2 rest = found + cubic_displacement(u_displacement, (target + found) * density, vec4(0.0), slope);
         float error = dot(rest, rest);
         best = error < least ? found : best;
         least = min(error, least);

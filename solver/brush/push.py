@@ -38,6 +38,10 @@ FARTHEST_COASTING, LONGEST_COASTING = 1.5, 1.0
 #    times the brush's speed without this law, and with it at less than twice in 99 of 100 cases (MEASURED.md).
 MOST_ENERGY = 1.5
 
+# 5. By time: in one step it carries what is under it no farther than its radius, however fast the tip is. A quicker tip
+#    leaves behind what it cannot carry, as it does on a long path: in one step the jet that it makes would draw it out.
+LONGEST_STEP = 1.0
+
 # A brush's own flow is damped by viscosity as a mode of k^2 = 12 / radius^2 (measured), and no more is put in for it
 # than so many times what is wanted.
 SQUARED_WAVENUMBER = 12.0
@@ -127,8 +131,10 @@ class Push:
 
     @property
     def velocities(self) -> list[Point]:
-        """What its images give: against the drag at the whole speed, and no stronger than along it."""
-        speed = (self.slip if self.strength > 0 else -self.slip) / self.dt
+        """What its images give: against the drag at the whole speed, and no stronger than along it; laws 1 and 5."""
+        far = math.dist(self.tip.start, self.tip.end)
+        most = LONGEST_STEP * self.tip.radius / far if far else math.inf
+        speed = math.copysign(min(abs(self.slip), most), self.slip * self.strength) / self.dt
         return [((end[0] - start[0]) * speed, (end[1] - start[1]) * speed) for start, end, _ in self.tip.paths]
 
     @property

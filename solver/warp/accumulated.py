@@ -20,8 +20,11 @@ from solver.warp.state import (
     CLOSED,
     MOST_CLOSED,
     MOST_CLOSED_BYTES,
+    OPEN,
+    STICKING,
     UNDONE,
     UNDONE_COMPONENTS,
+    Images,
     closed_in,
 )
 
@@ -81,6 +84,8 @@ class AccumulatedMap:
         closed: the closed maps, the first one closed first, and what was undone before each.
         limits: of the places looked up: left, top, right, bottom.
         finest: the smallest cell that has moved the map, longer sides; 0 if it may have any detail.
+        is_walled: nothing has crossed the picture's edges.
+        images: what lies beyond these then: it glides along an edge once anything that it has taken in has.
     """
 
     def __init__(self, device: Device, size: tuple[int, int], extent: tuple[float, float]) -> None:
@@ -100,6 +105,7 @@ class AccumulatedMap:
         self._done = 0  # of both
         self.limits = self._picture = (0.0, 0.0, *extent)
         self.is_walled = True
+        self.images = STICKING
         self.finest = 1.0
 
     def is_fine(self, grid: Grid) -> bool:
@@ -153,7 +159,17 @@ class AccumulatedMap:
     def own(self) -> dict[str, Any]:
         """The same without the closed maps, as a remap needs it: while there are any, it must stay in the picture."""
         limits = self._picture if self.closed else self.limits
-        return {"accumulated": self.now, "picture": self.extent, "limits": limits, "walled": float(self.is_walled)}
+        return {"accumulated": self.now, "picture": self.extent, "limits": limits, "edges": self.edges}
+
+    @property
+    def edges(self) -> Images:
+        """What lies beyond the picture's edges, of it and of the closed maps."""
+        return self.images if self.is_walled else OPEN
+
+    def take_sides(self, images: Images) -> None:
+        """Glide from now on along the edges along which a submap that will be taken in has."""
+        left, right, top, bottom = map(max, self.images, images)
+        self.images = left, right, top, bottom
 
     @property
     def _chain(self) -> list[TiledField]:
@@ -227,7 +243,9 @@ class AccumulatedMap:
                 self.closed.append(closed := self._blank(now.components, "closed map", size))
                 resample = self.device.pass_("warp/resample.frag", CUBIC=1)
                 regions = [_resampled(tile, self.size, size) for tile in now.tiles]
-                resample(closed, region=regions, displacement=now, origin=(0.0, 0.0), step=closed.texel)
+                resample(
+                    closed, region=regions, displacement=now, images=self.edges, origin=(0.0, 0.0), step=closed.texel
+                )
             # Clearing the map itself would copy at once what saves hold of it.
             self.now, self._next = self._next, self.now
             self.now.clear()
@@ -280,7 +298,9 @@ class AccumulatedMap:
         """(width, height) in texels of the closed maps, and of what is undone, as `saved` names them."""
         return [field.size for field in self._chain]
 
-    def restore(self, saved: dict[str, SavedTiles], limits: Limits, is_walled: bool, finest: float) -> None:
+    def restore(
+        self, saved: dict[str, SavedTiles], limits: Limits, is_walled: bool, images: Images, finest: float
+    ) -> None:
         """Go back to what `saved` gave, as it was then, with all else of then; what was planned is forgotten."""
         self.forget()
         self._stale.update(self.now.restore(saved[ACCUMULATED]))
@@ -298,7 +318,7 @@ class AccumulatedMap:
             self._begin_undoing()
         if undone is not None and self.undone is not None:
             self._stale.update(self.undone.restore(undone))
-        self.limits, self.is_walled, self.finest = limits, is_walled, finest
+        self.limits, self.is_walled, self.images, self.finest = limits, is_walled, images, finest
 
     def clear(self) -> None:
         """The identity; what was planned is forgotten."""
@@ -308,7 +328,7 @@ class AccumulatedMap:
             field.clear()
         self._stale.clear()
         self.finest = 1.0
-        self.limits, self.is_walled = self._picture, True
+        self.limits, self.is_walled, self.images = self._picture, True, STICKING
 
     def release(self) -> None:
         """Free the textures."""

@@ -10,7 +10,7 @@ from solver.gl.field import DoubleField, Field
 from solver.gl.passes import Region
 from solver.grid import Grid
 from solver.steepness import Steepness
-from solver.warp.state import FACTOR
+from solver.warp.state import FACTOR, OPEN, Images
 from solver.warp.submap import Level, defines_of, inputs_of
 
 # How far det J may fall where a factor is scaled, as a fraction of min(1, det J) at 100 %: 1/2 is a quarter turn. The
@@ -44,15 +44,15 @@ class Factors:
         """True if all of the map may be scaled as it is."""
         return not self._closed
 
-    def take(self, submap: Level, held: Field | None) -> None:
-        """Take in what a submap has moved, before it is emptied; `held`: the map's."""
-        self._merge(self._open.write, submap, held)
+    def take(self, submap: Level, held: Field | None, edges: Images = OPEN) -> None:
+        """Take in what a submap has moved, before it is emptied; `held` and `edges`: the map's."""
+        self._merge(self._open.write, submap, held, edges)
         left = self._left(self._open.write) if len(self._closed) < MOST else 1.0
         # If one remap turns the open factor too far, it begins a new one, unless nothing was turned before.
         if left < SPLIT and self._left(self._open.read) < 1:
             self._close(self._open.read)
             self._open.read.clear()
-            self._merge(self._open.write, submap, held)
+            self._merge(self._open.write, submap, held, edges)
             left = self._left(self._open.write)
         self._open.swap()
         if left < LEAST_LEFT and len(self._closed) < MOST:
@@ -80,6 +80,7 @@ class Factors:
         step: tuple[float, float],
         moved: Field | None = None,
         regions: list[Region] | None = None,
+        edges: Images = OPEN,
     ) -> Field:
         """Draw the product with every factor scaled at (fragment + origin) step, 0-1 of the picture, after `moved`.
 
@@ -88,11 +89,11 @@ class Factors:
         Returns:
             The one of both targets that holds it.
         """
-        self._merge(self._open.write, submap, None)
+        self._merge(self._open.write, submap, None, edges)
         target, other = targets
         for factor in (self._open.write, *reversed(self._closed)):
             inputs: dict[str, Any] = {"factor": factor, "amount": amount, "picture": self.picture}
-            inputs |= {"origin": origin, "step": step} | ({} if moved is None else {"moved": moved})
+            inputs |= {"origin": origin, "step": step, "edges": edges} | ({} if moved is None else {"moved": moved})
             follow = self.device.pass_("warp/follow_factor.frag", **({"FIRST": 1} if moved is None else {}))
             follow(target, region=regions, **inputs)
             moved, target, other = target, other, target
@@ -129,12 +130,12 @@ class Factors:
         closed.copy_from(field)
         self._closed.append(closed)
 
-    def _merge(self, target: Field, submap: Level, held: Field | None) -> None:
+    def _merge(self, target: Field, submap: Level, held: Field | None, edges: Images) -> None:
         """Draw the open factor after what a submap has moved."""
         levels = [submap]
         known = {} if held is None else {"held": held}
         follow = self.device.pass_("warp/follow_factor.frag", FIRST=1, SUBMAP=1, **defines_of(levels))
-        place: dict[str, Any] = {"origin": (0.0, 0.0), "step": target.texel}
+        place: dict[str, Any] = {"origin": (0.0, 0.0), "step": target.texel, "edges": edges}
         follow(target, factor=self._open.read, amount=1.0, picture=self.picture, **inputs_of(levels, known), **place)
 
     def _left(self, factor: Field) -> float:

@@ -22,16 +22,17 @@ from solver.gl.passes import Region
 from solver.gl.points import draw_at, drawn_at
 from solver.grid import Grid
 from solver.limits import check_finite, check_size, check_step, check_type, numbers, places, real_array
+from solver.params import Walls
 from solver.state import State
-from solver.trace import Tracing
+from solver.trace import MOST_PARTS, Tracing
 from solver.warp.accumulated import LEAST_TEXELS, AccumulatedMap
 from solver.warp.distortion import MapStatistics, distortion
 from solver.warp.factors import Factors
 from solver.warp.frozen import Frozen
 from solver.warp.prescribed import traced
 from solver.warp.remapping import Remapping
-from solver.warp.state import ACCUMULATED, FACTOR, SIZES, SUBMAPS, MapState, grid_in, values_of
-from solver.warp.submap import Level, Submap, away_from_held, defines_of, inputs_of, window_of
+from solver.warp.state import ACCUMULATED, FACTOR, OPEN, SIZES, SUBMAPS, Images, MapState, grid_in, images_in, values_of
+from solver.warp.submap import STEEPEST, Level, Submap, away_from_held, defines_of, images_of, inputs_of, window_of
 
 CHECK_EVERY = 2  # steps between two looks at how far the map is bent: a quick push bends it by 1 in two
 MOST_PLACES = 2**19  # at which its distortion is looked at
@@ -93,12 +94,17 @@ class WarpMap:
     @property
     def submap(self) -> Level:
         """What has moved since the last remap."""
-        return Level(self._submap.read, self.grid, self._is_weighed)
+        return Level(self._submap.read, self.grid, self._is_weighed, self._submap.images)
 
     @property
     def held(self) -> Field | None:
         """Where it is held: texels of 1/2 and more; None if it is held nowhere."""
         return self._frozen.held
+
+    @property
+    def edges(self) -> Images:
+        """What lies beyond the picture's edges; see `lib/displacement.glsl`."""
+        return self._accumulated.edges
 
     @property
     def is_untouched(self) -> bool:
@@ -108,11 +114,17 @@ class WarpMap:
     # -- moving it --------------------------------------------------------------------------------------------------
 
     def follow(self, fluid: Fluid, dt: float) -> None:
-        """Carry the map `dt` seconds by a fluid, along the trace that the fluid's own next step follows too."""
+        """Carry the map `dt` seconds by a fluid, along the trace that the fluid's own next step follows too.
+
+        In parts, if the submap would be bent too far in one, so that each may end with a remap.
+        """
         check_type("what the map is to follow", fluid, Fluid)
         if fluid.grid != self.grid:
             raise ValueError(f"a map on {self.grid} cannot follow a fluid on {fluid.grid}; `move_to` takes it there")
-        self._advance(fluid.begin_trace(check_step(dt)) or fluid.trace(dt))
+        strain = fluid.strain(check_step(dt))
+        parts = math.ceil(min(strain / STEEPEST, MOST_PARTS)) if strain > STEEPEST else 1
+        for _ in range(parts):
+            self._advance(fluid.begin_trace(dt / parts) or fluid.trace(dt / parts), fluid.params.walls, parts > 1)
 
     def advance(self, velocity: Field, dt: float) -> None:
         """Carry the map one step by a velocity on the MAC grid, constant over the step: second-order backtrace."""
@@ -128,14 +140,18 @@ class WarpMap:
         check_field("a trace", trace, self.grid)
         self._advance(trace)
 
-    def _advance(self, trace: Field | Tracing) -> None:
-        """Make a step, and go on with a remap, or begin one if it is time."""
+    def _advance(self, trace: Field | Tracing, walls: Walls | None = None, looks: bool = False) -> None:
+        """Make a step between walls, and go on with a remap, or begin one if it is time: `looks` at once whether."""
+        images = images_of(walls or Walls(), self.grid)
+        if images != self._submap.images:
+            self._begin_remap()
+            self._submap.images = images
         self._submap.advance(trace, self._accumulated.is_walled)
         self._steps += 1
         self._changed()
         self._remapping.advance(self.grid)
         # Reading the steepness waits for the GPU, so not at every step; at fixed ones, so that a replay remaps alike.
-        looks = self._steps % CHECK_EVERY == 0
+        looks = looks or self._steps % CHECK_EVERY == 0
         if self._steps >= self.remap_every or (looks and (not self._is_settled or self._submap.is_steep)):
             self._begin_remap()
 
@@ -302,11 +318,11 @@ class WarpMap:
         # Each of them in float32, as the shaders take them.
         lowest, highest = np.minimum(0, [across.min(), down.min()]), [across.max(), down.max()]
         self._accumulated.set(
-            lambda target: resample(target, displacement=given, origin=(0.0, 0.0), step=target.texel),
+            lambda target: resample(target, displacement=given, images=OPEN, origin=(0.0, 0.0), step=target.texel),
             (*lowest.tolist(), *np.maximum(self.extent, highest).tolist()),
         )
         self.factors.begin_with(
-            lambda target: resample(target, displacement=given, origin=(0.0, 0.0), step=target.texel)
+            lambda target: resample(target, displacement=given, images=OPEN, origin=(0.0, 0.0), step=target.texel)
         )
         given.release()
         self._frozen.draw_anew(self.draw_held)
@@ -316,12 +332,14 @@ class WarpMap:
         fields: dict[str, Field] = {"submap": self._submap.read, **self._accumulated.saved()}
         accumulated = self._accumulated
         values: dict[str, Any] = {"steps": self._steps, "limits": accumulated.limits, "walled": accumulated.is_walled}
+        values[f"{ACCUMULATED} images"] = accumulated.images
         values |= {"finest": accumulated.finest} | ({SIZES: accumulated.sizes} if accumulated.sizes else {})
-        values |= {"grid": values_of(self.grid), "settled": self._is_settled}
+        values |= {"grid": values_of(self.grid), "settled": self._is_settled, "submap images": self._submap.images}
         fields |= self.factors.save()
         for name, level in self._remapping.saved():
             fields[name] = level.field
-            values |= {SUBMAPS[name]: values_of(level.grid), "remapping": self._remapping.progress}
+            values |= {SUBMAPS[name]: values_of(level.grid), f"{name} images": level.images}
+            values["remapping"] = self._remapping.progress
             values["weighed"] = self._remapping.is_weighed
         state = MapState.of(self.device, fields, **values)
         state.tiles.update(self._frozen.save())
@@ -338,20 +356,24 @@ class WarpMap:
         tiles = state.tiles.get(ACCUMULATED)
         if grid.picture != self.extent or tiles is None or tiles.kind != self._accumulated.now.kind:
             raise ValueError("the state is of another picture")
+        images = {name: images_in(state.values, name) for name in (*SUBMAPS, ACCUMULATED)}
         left, top, right, bottom = state.values["limits"].tolist()
         is_walled = bool(state.values.get("walled", True))
         finest = float(state.values.get("finest", 0.0))
-        self._accumulated.restore(state.tiles, (left, top, right, bottom), is_walled, finest)
+        self._accumulated.restore(state.tiles, (left, top, right, bottom), is_walled, images[ACCUMULATED], finest)
         if grid != self.grid:
             self._submap.release()
             self._submap = Submap(self.device, grid)
         self._submap.read.copy_from(state.fields["submap"])
+        self._submap.images = images["submap"]
         self._steps = int(state.values["steps"])
         self._is_settled = bool(state.values["settled"])
         self._frozen.restore(state.tiles)
         is_weighed = bool(state.values.get("weighed", False))
         waiting = {
-            name: Level(state.fields[name], grid_in(state.values, place), name == "pending" and is_weighed)
+            name: Level(
+                state.fields[name], grid_in(state.values, place), name == "pending" and is_weighed, images[name]
+            )
             for name, place in SUBMAPS.items()
             if name != "submap" and name in state.fields
         }
@@ -522,7 +544,7 @@ class WarpMap:
     def _begin_remap(self) -> None:
         """Hand what has moved to the remapping, and begin with an empty submap."""
         if self._steps:
-            self.factors.take(self.submap, self.held)
+            self.factors.take(self.submap, self.held, self.edges)
             self._remapping.give(self._submap, self._is_weighed)
             self._steps = 0
             self._is_settled = True

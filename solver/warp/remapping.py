@@ -67,13 +67,14 @@ class Remapping:
 
     def give(self, submap: Submap, is_weighed: bool) -> None:
         """Take over what a submap holds, weighted or not, and empty it."""
-        if self._gathered is not None and self._gathered.grid != submap.grid:
+        gathered = self._gathered
+        if gathered is not None and (gathered.grid, gathered.images) != (submap.grid, submap.images):
             self.finish()
         elif self._tiles * (1 - self._done / self._whole) <= FEW_TILES:
             self._take_in(1.0)
         if self._pending is not None:
             self._gather(submap, is_weighed)
-        elif self._stand_by(Level(submap.read, submap.grid, is_weighed)):
+        elif self._stand_by(Level(submap.read, submap.grid, is_weighed, submap.images)):
             submap.replace()
 
     def settle(self) -> None:
@@ -123,9 +124,9 @@ class Remapping:
         """Go on with copies of what `saved` gave; the accumulated map is that of then."""
         self.drop()
         copies = {}
-        for name, (field, grid, is_weighed) in saved.items():
-            copies[name] = Level(self.device.field(field.size, 2, f"{name} submap"), grid, is_weighed)
-            copies[name].field.copy_from(field)
+        for name, level in saved.items():
+            copies[name] = level._replace(field=self.device.field(level.field.size, 2, f"{name} submap"))
+            copies[name].field.copy_from(level.field)
         self._gathered, pending = copies.get("gathered"), copies.get("pending")
         if pending is not None:
             self._stand_by(pending, progress)
@@ -142,11 +143,13 @@ class Remapping:
     def _begin(self, levels: list[Level]) -> int:
         """Plan the accumulated map's tiles anew that these levels move; how many there are."""
         is_held = self._frozen.held is not None
+        for level in levels:
+            self._accumulated.take_sides(level.images)
         return self._accumulated.begin(*((level.field.get(), level.grid) for level in levels), is_held=is_held)
 
     def _gather(self, submap: Submap, is_weighed: bool) -> None:
         """Add a submap to the gathered level; the first one is that level, unless its weights have to be fixed."""
-        before, level = self._gathered, Level(submap.read, submap.grid, is_weighed)
+        before, level = self._gathered, Level(submap.read, submap.grid, is_weighed, submap.images)
         if before is None and not is_weighed:
             self._gathered = level
             submap.replace()
@@ -173,7 +176,7 @@ class Remapping:
             origin=origin,
             step=fractions,
         )
-        return Level(field, grid)
+        return Level(field, grid, images=levels[0].images)
 
     def _take_in(self, part: float) -> None:
         """Do a `part`, 0-1, of taking in the pending level."""

@@ -132,6 +132,6 @@ class ScaledMap:
         if not warp.factors.is_one and warp.held is None:
             for name, part in (("scaled", amount), ("unscaled", 1.0)):
                 targets = fields.get(name, target.size, 2), fields.get(f"{name}, too", target.size, 2)
-                bent[name] = warp.factors.draw(targets, part, warp.submap, origin, step, before, regions)
+                bent[name] = warp.factors.draw(targets, part, warp.submap, origin, step, before, regions, warp.edges)
         scale = self.device.pass_("warp/scale.frag", **({"BENT": 1} if bent else {}))
         scale(target, region=regions, displacement=whole, amount=amount, **bent)

@@ -21,6 +21,13 @@ MOST_CLOSED = 8
 MOST_CLOSED_BYTES = 2**27  # of them in all
 UNDONE_COMPONENTS = 4  # of what is undone: three, and one more as OpenGL 3.3 draws into no texture of three
 
+Images = tuple[float, float, float, float]
+"""What lies beyond the left, right, top and bottom side: `images` of `lib/displacement.glsl`."""
+
+OPEN: Images = (0.0, 0.0, 0.0, 0.0)
+GLIDING: Images = (1.0, 1.0, 1.0, 1.0)
+STICKING: Images = (-1.0, -1.0, -1.0, -1.0)
+
 
 class MapState(State):
     """The state of a warp map: its submap and those that wait, each of a grid, its factors and its tiles."""
@@ -100,6 +107,19 @@ def closed_in(names: Iterable[str]) -> list[str]:
 def held_kinds(size: tuple[int, int]) -> dict[str, Kind]:
     """Of the tiles of `Frozen`, by name, for a map of `size` texels."""
     return {"held": Kind(size, 1, "f1", TILE), "kept": Kind(size, 2, "f4", TILE)}
+
+
+def images_in(values: Mapping[str, np.ndarray], name: str) -> Images:
+    """The images of a map of this name, as saved; one that was saved without any glides.
+
+    Raises:
+        ValueError: if they are none.
+    """
+    numbers = np.asarray(values.get(f"{name} images", np.ones(4)))
+    if numbers.shape != (4,) or not np.isin(numbers, (-1.0, 1.0)).all():
+        raise ValueError(f"what lies beyond the edges of its {name} is missing")
+    left, right, top, bottom = numbers.tolist()
+    return left, right, top, bottom
 
 
 def values_of(grid: Grid) -> np.ndarray:

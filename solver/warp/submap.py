@@ -7,12 +7,14 @@ from typing import Any, NamedTuple
 from solver.gl.device import Device
 from solver.gl.field import DoubleField, Field
 from solver.grid import Grid
+from solver.params import Walls
 from solver.steepness import Steepness
 from solver.trace import Tracing
 from solver.warp.frozen import FADED
+from solver.warp.state import GLIDING, OPEN, Images
 
 STEEPEST = 1.0  # largest |grad S| that the cubic carries well
-NAMES = ("submap", "window"), ("second", "second_window"), ("third", "third_window")  # of levels, in shaders
+NAMES = "", "second_", "third_"  # of levels, in shaders
 
 
 class Submap(DoubleField):
@@ -24,6 +26,7 @@ class Submap(DoubleField):
 
     Attributes:
         trace: how far back the fluid came from, in cells, for a caller without a trace of its own.
+        images: what lies beyond its sides, as of what has moved it since it was empty.
     """
 
     def __init__(self, device: Device, grid: Grid) -> None:
@@ -31,6 +34,7 @@ class Submap(DoubleField):
         self.device = device
         self.grid = grid
         self.trace = device.field(grid.size, 2, "submap, trace")
+        self.images = GLIDING
         self._steepness = Steepness(device, grid.size, "submap")
 
     def advance(self, trace: Field | Tracing, is_walled: bool) -> None:
@@ -42,7 +46,8 @@ class Submap(DoubleField):
         if any(inner):
             inputs, defines = {**inputs, "inner": inner}, {**defines, "INNER": 1}
         advance = self.device.pass_("warp/advance.frag", **defines)
-        advance(target, displacement=self.read, spacing=self.grid.spacing, walled=float(is_walled), **inputs)
+        inputs["images"] = self.images if is_walled else OPEN
+        advance(target, displacement=self.read, spacing=self.grid.spacing, **inputs)
         self.swap()
 
     def replace(self) -> Field:
@@ -66,16 +71,29 @@ class Level(NamedTuple):
 
     Attributes:
         is_weighed: it moves less and less before what is held; see `lib/warp.glsl`.
+        images: of the submap.
     """
 
     field: Field
     grid: Grid
     is_weighed: bool = False
+    images: Images = GLIDING
 
 
 def window_of(grid: Grid) -> tuple[float, float, float, float]:
     """Left, top, width and height of what a grid covers, longer sides."""
     return *grid.origin, *grid.extent
+
+
+def images_of(walls: Walls, grid: Grid) -> Images:
+    """What lies beyond the sides of what a fluid moves between walls.
+
+    What sticks to a wall at rest is odd there, as the velocity is; a wall that moves carries it along. Beyond a side
+    that is not the picture's edge nothing moves.
+    """
+    sides = zip(walls.images, walls.speed, grid.at_edge, strict=True)
+    left, right, top, bottom = (-1.0 if not at_edge else 1.0 if speed else image for image, speed, at_edge in sides)
+    return left, right, top, bottom
 
 
 def defines_of(levels: list[Level]) -> dict[str, object]:
@@ -93,6 +111,7 @@ def away_from_held(levels: list[Level]) -> list[Level]:
 def inputs_of(levels: list[Level], held: dict[str, Any]) -> dict[str, Any]:
     """Levels, the uppermost first, and what is held as `lib/warp.glsl` has them."""
     parts = dict(held)
-    for (name, window), level in zip(NAMES, levels, strict=False):
-        parts |= {name: level.field, window: window_of(level.grid)}
+    for name, level in zip(NAMES, levels, strict=False):
+        field = name.removesuffix("_") or "submap"
+        parts |= {field: level.field, f"{name}window": window_of(level.grid), f"{name}images": level.images}
     return parts

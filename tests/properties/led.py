@@ -186,3 +186,26 @@ def check_handles_fold_nothing(device: Device, seed: int) -> dict[str, float]:
             raise AssertionError(told)
         return {"folded without handles": 1.0}
     return {"least det J, from 1": 1 - least}
+
+
+def quick_push(seed: int) -> dict[str, Any]:
+    """One push of a brush of one cell to three, one to two and a half of its radii a tick."""
+    rng = np.random.default_rng(seed)
+    (viscosity, drag), grid, ticks = FEELS[seed % len(FEELS)], int(rng.choice([32, 48])), int(rng.integers(4, 9))
+    radius, angle = rng.uniform(1, 3) / grid, rng.uniform(0, 2 * np.pi)
+    way = min(rng.uniform(1, 2.5) * radius * (ticks - 1), 0.6) * np.array([np.cos(angle), np.sin(angle)])
+    start = rng.uniform(0.05, 0.95, 2)
+    start = np.clip(start, 0.05 - np.minimum(way, 0), 0.95 - np.maximum(way, 0))
+    samples = [[tick, *(start + way * tick / (ticks - 1)).round(4).tolist(), 1.0] for tick in range(ticks)]
+    stroke = {"tool": "push", "radius": round(radius, 4), "hardness": round(rng.uniform(0, 1), 3), "samples": samples}
+    fluid = {"grid": grid, "dt": DT, "viscosity": viscosity, "drag": drag}
+    return {"version": 5, "duration": 0.4, "fluid": fluid, "stroke": [stroke]}
+
+
+def check_quick_push(device: Device, seed: int) -> dict[str, float]:
+    """No place folds where a step bends the submap farther than it may be bent."""
+    recipe = quick_push(seed)
+    texels = 8 * recipe["fluid"]["grid"]
+    folds, least, first = played(device, recipe, (texels, texels))
+    assert not folds, f"{folds} places fold, the first at tick {first}, least det J {least:.3f}"
+    return {"least det J, from 1": 1 - least}

@@ -255,6 +255,16 @@ def test_what_a_brush_has_drawn_acts_in_one_step(device: Device) -> None:
         thing.release()
 
 
+@pytest.mark.parametrize(
+    ("far", "slip", "moved"), [(0.05, 1.0, 0.05), (0.3, 1.0, 0.1), (0.3, 0.5, 0.1), (0.15, 0.5, 0.075)]
+)
+def test_a_push_carries_by_no_more_than_its_radius_in_a_step(far: float, slip: float, moved: float) -> None:
+    for strength, sign in ((1.0, 1), (-0.5, -1)):
+        push = Push(Tip((0.2, 0.3), (0.2 + 0.6 * far, 0.3 - 0.8 * far), 0.1), 1 / 60, strength, slip)
+        assert push.velocities == [pytest.approx((sign * 60 * 0.6 * moved, sign * -60 * 0.8 * moved))]
+    assert Push(Tip((0.2, 0.3), (0.2, 0.3), 0.1), 1 / 60).velocities == [(0.0, 0.0)]
+
+
 @pytest.mark.parametrize("radii", [0.3, 1.0, 3.0])
 def test_a_push_slips_by_the_path_that_the_picture_has_come_with_it(device: Device, radii: float) -> None:
     """What lies where a push to the right has brought it, unstrained, is pushed on, or back."""

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 import pytest
 from scipy import ndimage
 
+from properties.fluid import TURNS, turned_map, turned_walls
 from solver.brush.masks import Masks
 from solver.fluid import Fluid
 from solver.gl.device import Device
 from solver.gl.tiled import TILE, TiledField
 from solver.grid import Grid
 from solver.paper import PaperWarpMap
+from solver.params import FluidParams, Walls
 from solver.resample.sampler import Sampler
 from solver.warp.accumulated import map_size
 from solver.warp.factors import Factors
@@ -38,15 +42,20 @@ def difference(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.abs(a - b).max() / np.abs(b).max())
 
 
+@pytest.mark.parametrize("slip", ["free", "none"])
 @pytest.mark.parametrize("size", [(37, 23), (8, 8), (16, 51)])
-def test_one_step_agrees_with_float64(device: Device, size: tuple[int, int]) -> None:
+def test_one_step_agrees_with_float64(device: Device, size: tuple[int, int], slip: Literal["free", "none"]) -> None:
+    """Within half a cell of the edges too, where it goes on as its image."""
     rng = np.random.default_rng(3)
     grid = Grid(*size)
-    submap, trace = smooth(rng, size, 0.1), smooth(rng, size, 3.0)
-    warp = WarpMap(device, grid)
+    fluid, warp = Fluid(device, grid, FluidParams(walls=Walls(slip))), WarpMap(device, grid)
+    fluid.set_velocity(reference.smooth_velocity(*size, seed=5, cells=2.0))
+    submap, dt = smooth(rng, size, 0.1), 0.7 * grid.h
     warp.submap.field.set(submap)
-    warp.advance_traced(device.upload(trace))
-    assert difference(warp.submap.field.get(), reference.advance_map(submap, trace, grid.h)) < 1e-5
+    warp.follow(fluid, dt)
+    side = 1 if slip == "free" else -1
+    expected = reference.advance_map(submap, fluid.trace(dt).get(), grid.h, (side, side, side, side))
+    assert difference(warp.submap.field.get(), expected) < 1e-5
 
 
 @pytest.mark.parametrize("size", [(37, 23), (8, 8), (16, 51)])
@@ -94,6 +103,30 @@ def test_vortex_comes_back(device: Device) -> None:
     assert np.abs(np.hypot(found[:, 0] - 0.5, found[:, 1] - 0.75) - 0.15).max() < 5e-5
 
 
+def test_a_step_that_bends_far_is_carried_in_parts(device: Device) -> None:
+    """Each may end with a remap: a swirl by one and a half radians in one step is as exact as its trace."""
+    grid = Grid(48, 48)
+    fluid, warp = Fluid(device, grid), WarpMap(device, grid)
+
+    def turning(x: np.ndarray, y: np.ndarray, _: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        x, y = x - 0.5, y - 0.5
+        rate = 6 * np.exp(-(x**2 + y**2) / 0.02)
+        return -y * rate, x * rate
+
+    fluid.set_velocity(turning)
+    assert fluid.strain(0.25) > 2
+    warp.follow(fluid, 0.25)
+    assert warp.statistics().det_min > 0.9
+    points = np.random.default_rng(0).random((2000, 2))
+    true = np.stack(reference.follow(turning, points[:, 0], points[:, 1], 0.25, 0.0, 50), axis=-1)
+    off = np.linalg.norm(points + warp.at(points) - true, axis=-1)
+    assert off.max() < 0.1 * grid.h
+    still = fluid.trace(0.25).get()  # that the fluid's own next step follows is still of all of it
+    assert np.abs(still).max() > 3
+    for thing in (fluid, warp):
+        thing.release()
+
+
 def test_small_steps_do_not_blur(device: Device) -> None:
     """A quarter of the vortex's path in steps of CFL 0.1, where interpolating every step would blur most."""
     grid = Grid(48, 48)
@@ -126,6 +159,63 @@ def test_fluid_velocity_on_faces(device: Device) -> None:
     assert errors[0] / errors[1] > 3.0
 
 
+def read_between(
+    device: Device, field: np.ndarray, images: tuple[float, ...], size: tuple[int, int], part: float, cubic: bool
+) -> np.ndarray:
+    """A displacement at a lattice of `size` over a part, 0-1, of its texels from the top left corner on."""
+    given, found = device.upload(field.astype(np.float32)), device.field(size, 2)
+    step = part / size[0], part / size[1]
+    resample = device.pass_("warp/resample.frag", **({"CUBIC": 1} if cubic else {}))
+    resample(found, displacement=given, images=images, origin=(0.0, 0.0), step=step)
+    read = found.get()
+    given.release()
+    found.release()
+    return read
+
+
+@pytest.mark.parametrize("cubic", [True, False], ids=["cubic", "quintic"])
+@pytest.mark.parametrize("seed", range(4))
+def test_what_is_its_own_image_beyond_an_edge_goes_on_exactly(seed: int, cubic: bool, device: Device) -> None:
+    """Odd polynomials across an edge times even ones along it, or odd ones where it sticks, up to the corner."""
+    rng = np.random.default_rng(seed)
+    sticks = rng.random(2) < 0.5  # at the left and the top edge
+    images = -1.0 if sticks[0] else 1.0, 1.0, -1.0 if sticks[1] else 1.0, 1.0
+    a = rng.normal(size=(2, 4))
+
+    def wanted(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        parts = []
+        for across, along, is_odd, k in ((x, y, sticks[1], 0), (y, x, sticks[0], 1)):
+            first = along if is_odd else 1.0
+            if cubic:  # blended: of the third degree along one axis or the other
+                parts.append(first * (a[k, 0] * across * (1 + a[k, 1] * along**2) + a[k, 2] * across**3))
+            else:
+                odd = across + a[k, 0] * across**3 + a[k, 1] * across**5
+                parts.append(first * odd * (1 + a[k, 2] * along**2 + a[k, 3] * along**4))
+        return np.stack(parts, axis=-1)
+
+    field = wanted(*np.meshgrid(*2 * [(np.arange(16) + 0.5) / 8]))
+    expected = wanted(*np.meshgrid(*2 * [(np.arange(24) + 0.5) / 64]))  # of the first three texels
+    assert read_between(device, field, images, (24, 24), 3 / 16, cubic) == pytest.approx(expected, rel=1e-5, abs=1e-5)
+
+
+@pytest.mark.parametrize("cubic", [True, False], ids=["cubic", "quintic"])
+@pytest.mark.parametrize("seed", range(4))
+def test_what_lies_beyond_the_edges_is_mirrored_and_transposed_with_the_map(
+    seed: int, cubic: bool, device: Device
+) -> None:
+    rng = np.random.default_rng(seed)
+    field, sticky = rng.normal(size=(12, 16, 2)), rng.random(4) < 0.5
+    walls = Walls(sticky=tuple(sticky.tolist()))
+
+    def found(turn: str) -> np.ndarray:
+        size = (60, 80) if "t" in turn else (80, 60)
+        return read_between(device, turned_map(field, turn), turned_walls(walls, turn).images, size, 1.0, cubic)
+
+    plain = found("")
+    for turn in TURNS:
+        assert found(turn) == pytest.approx(turned_map(plain, turn), rel=1e-5, abs=1e-5), turn
+
+
 def test_what_no_flow_crosses_the_map_does_not_leave(device: Device) -> None:
     """Along the edges it goes on to them, in all levels; else what is cut off there folds the last texels."""
     grid = Grid(16, 16)
@@ -142,6 +232,33 @@ def test_what_no_flow_crosses_the_map_does_not_leave(device: Device) -> None:
     given = np.full((128, 128, 2), 0.05)  # such a map of one's own stays what it is
     warp.set(given)
     assert warp.at(np.array([[0.0, 0.3]])) == pytest.approx(0.05, abs=1e-6)
+
+
+def test_where_the_fluid_sticks_the_edge_of_the_picture_stays(device: Device) -> None:
+    """Once it glides the map glides too, and where it sticks from then on, it stays where it has come to."""
+    grid = Grid(16, 16)
+    along = np.linspace(0.01, 0.99, 33)
+    top = np.stack([along, 0 * along], axis=-1)
+    fluid, warp = Fluid(device, grid, FluidParams(walls=Walls("none"))), WarpMap(device, grid, (128, 128))
+    stream = np.sin(np.pi * (np.arange(17) / 16))
+    flow = 3 * np.stack([np.diff(s := stream[:, None] * stream, axis=0)[:, :-1], -np.diff(s, axis=1)[:-1]], axis=-1)
+    fluid.set_velocity(flow)
+    for _ in range(24):
+        warp.follow(fluid, 0.05)
+    assert np.abs(warp.read()).max() > 0.1
+    assert np.abs(warp.at(top)).max() < 1e-6
+    fluid.params = FluidParams()
+    for _ in range(12):
+        warp.follow(fluid, 0.05)
+    there = warp.at(top)
+    assert np.abs(there[:, 0]).max() > 0.05
+    fluid.params = FluidParams(walls=Walls("none"))
+    for _ in range(12):
+        warp.follow(fluid, 0.05)
+    assert warp.at(top) == pytest.approx(there, abs=1e-5)
+    assert warp.statistics().folds == 0
+    for thing in (warp, fluid):
+        thing.release()
 
 
 def test_rest_is_the_identity_exactly(device: Device) -> None:
@@ -610,6 +727,27 @@ def test_a_window_carries_what_the_whole_picture_carries(device: Device) -> None
     outside = np.ones((256, 384), bool)
     outside[32:224, 80:240] = False
     assert not some[outside].any()
+
+
+def test_at_the_inner_sides_of_a_window_the_map_has_no_step(device: Device) -> None:
+    """What moves along them has come to rest there; at the picture's edge it glides on."""
+    cells = window(Grid(32, 32), 8, 0, 16, 16)
+    fluid, warp = Fluid(device, cells), WarpMap(device, cells, (128, 128))
+    x, y = (np.arange(17) / 16 for _ in range(2))
+    stream = 0.2 * np.sin(np.pi * x)[None] * np.sin(np.pi * y)[:, None]
+    fluid.set_velocity(32 * np.stack([np.diff(stream, axis=0)[:, :-1], -np.diff(stream, axis=1)[:-1]], axis=-1))
+    for _ in range(12):
+        warp.follow(fluid, 1 / 600)
+    (left, top), (width, height) = cells.origin, cells.extent
+    along = np.linspace(0.02, 0.98, 33)
+    inner = [(0 * along + left, top + height * along), (0 * along + left + width, top + height * along)]
+    inner += [(left + width * along, 0 * along + top + height)]
+    for side in inner:
+        assert np.abs(warp.at(np.stack(side, axis=-1))).max() < 1e-6
+    edge = warp.at(np.stack([left + width * along, 0 * along], axis=-1))
+    assert np.abs(edge[:, 0]).max() > 0.005
+    for thing in (fluid, warp):
+        thing.release()
 
 
 def wound_up(device: Device, time: float) -> WarpMap:

@@ -9,6 +9,7 @@ from scipy import ndimage, sparse
 from scipy.sparse import linalg as sparse_linalg
 
 Faces = np.ndarray
+Images = tuple[float, float, float, float]
 
 # ---------------------------------------------------------------------------------------------------------------------
 # The stages of a step
@@ -183,34 +184,45 @@ def _nodes(position: np.ndarray, count: int, points: int, support: int) -> tuple
     return first[..., None] + np.arange(points), value
 
 
-def _away(position: np.ndarray, around: np.ndarray, count: int, support: int) -> np.ndarray:
-    """How far from the edge, in texels, where one of the `support` texels around some places lies at it; else 1."""
-    first = np.clip(np.floor(around - 0.5).astype(int) - (support // 2 - 1), 0, count - support)
-    return np.where(first == 0, position, 1.0) * np.where(first == count - support, count - position, 1.0)
+def with_images(field: np.ndarray, images: Images) -> np.ndarray:
+    """A displacement (ny, nx, 2) with PAD texels more on every side, images of those inside: the component across the
+    edge is odd; that along the left, right, top and bottom edge counts as often as `images` says."""
+    field = np.pad(field.astype(float), ((PAD, PAD), (PAD, PAD), (0, 0)), mode="symmetric")
+    left, right, top, bottom = images
+    for beyond, signs in (
+        (field[:, :PAD], (-1, left)),
+        (field[:, -PAD:], (-1, right)),
+        (field[:PAD], (top, -1)),
+        (field[-PAD:], (bottom, -1)),
+    ):
+        beyond *= signs
+    return field
 
 
 def lagrange(
-    field: np.ndarray, x: np.ndarray, y: np.ndarray, points: tuple[int, int], support: int, walled: bool = False
+    field: np.ndarray,
+    x: np.ndarray,
+    y: np.ndarray,
+    points: tuple[int, int],
+    support: int,
+    images: Images | None = None,
 ) -> np.ndarray:
     """`field` (ny, nx, c) at positions x, y by Lagrange polynomials through `points` texels along x and y.
 
-    With `walled`, of (ny, nx, 2) what crosses an edge is 0 there: it is divided by how far its place is from the edge,
-    and in the end multiplied by that of the position.
+    With `images`, of (ny, nx, 2) what lies beyond the edges is found by them.
     """
+    if images:
+        return lagrange(with_images(field, images), np.asarray(x) + PAD, np.asarray(y) + PAD, points, support)
     x, y, (ny, nx) = np.asarray(x, float), np.asarray(y, float), field.shape[:2]
     columns, wx = _nodes(x, nx, points[0], support)
     rows, wy = _nodes(y, ny, points[1], support)
     values = field.astype(float)[rows[..., :, None], columns[..., None, :]]
-    if walled:
-        across = _away(columns + 0.5, x[..., None], nx, support) / _away(x, x, nx, support)[..., None]
-        down = _away(rows + 0.5, y[..., None], ny, support) / _away(y, y, ny, support)[..., None]
-        values /= np.stack(np.broadcast_arrays(across[..., None, :], down[..., :, None]), axis=-1)
     return np.einsum("...j,...i,...jic->...c", wy, wx, values)
 
 
-def cubic_displacement(field: np.ndarray, x: np.ndarray, y: np.ndarray, walled: bool = False) -> np.ndarray:
+def cubic_displacement(field: np.ndarray, x: np.ndarray, y: np.ndarray, images: Images | None = None) -> np.ndarray:
     """The Boolean sum of the cubic along x and the cubic along y."""
-    along_x, along_y, linear = (lagrange(field, x, y, points, 4, walled) for points in ((4, 2), (2, 4), (2, 2)))
+    along_x, along_y, linear = (lagrange(field, x, y, points, 4, images) for points in ((4, 2), (2, 4), (2, 2)))
     return along_x + along_y - linear
 
 
@@ -221,11 +233,11 @@ def texel_centres(size: tuple[int, int], texels: tuple[int, int]) -> tuple[np.nd
     return tuple(np.meshgrid(x, y))  # pyright: ignore[reportReturnType]
 
 
-def advance_map(submap: np.ndarray, trace: np.ndarray, h: float) -> np.ndarray:
+def advance_map(submap: np.ndarray, trace: np.ndarray, h: float, images: Images = (1, 1, 1, 1)) -> np.ndarray:
     """submap'(x) = (x_d - x) + submap(x_d), with x_d - x = `trace` in cells, no place outside the picture."""
     ny, nx = submap.shape[:2]
     x, y = texel_centres((nx, ny), (nx, ny))
-    moved = trace + cubic_displacement(submap, x + trace[..., 0], y + trace[..., 1], walled=True) / h
+    moved = trace + cubic_displacement(submap, x + trace[..., 0], y + trace[..., 1], images) / h
     return h * np.stack([np.clip(moved[..., 0], -x, nx - x), np.clip(moved[..., 1], -y, ny - y)], axis=-1)
 
 
