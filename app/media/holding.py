@@ -16,16 +16,17 @@ from app.media.codecs import png
 from app.media.codecs.exr import unusual_attributes
 from app.media.codecs.metadata import tag_names
 from app.media.depth import as_half, to_bits
-from app.media.encoders import ANIMATIONS, Stream, depth_of, has_alpha
+from app.media.encoders import ANIMATIONS, Stream, check_colours_of_picture, depth_of, has_alpha
 from app.media.files import is_sequence
-from app.media.formats import FORMATS, Format, fits_profile, picture_format, profile_name, written_depth
+from app.media.formats import Format, fits_profile, picture_format, profile_name, written_depth
 from app.media.losses import REC709, counted, few
 from app.model.picture import Picture, linear_to_srgb, unpremultiplied
 
 PNG_STEP = png.METRE  # PNG tells whole dots a metre, and no 72 an inch
 HALF_DIGITS, FLOAT_DIGITS = 11, 24  # significant binary ones (IEEE 754)
 LARGEST_HALF = 65520.0  # what is less is rounded to a half that is finite
-BETTER = (".png", ".tif", ".exr", ".webp", ".jpg", ".mkv", ".mov", ".webm")  # what is named first where several hold it
+# What is named first where several hold what is lost, of stills and of animations.
+BETTER, BETTER_MOVING = (".png", ".tif", ".exr", ".webp", ".jpg"), (".mkv", ".mov", ".webm")
 VALUES_AT_ONCE = 500_000
 
 
@@ -120,17 +121,42 @@ def _straight(picture: Picture) -> Iterator[np.ndarray]:
 
 def _depth(picture: Picture, room: Room) -> str:
     clip = room.how.clip
-    if clip is not None and not clip.is_whole:
-        if room.kind is None:
-            return ""  # of a video among videos it is told beside the resolution of its colours: `unheld_of_clip`
-        digits = depth_of(clip.pixel_format)[0]
-        named = f"{digits}"
+    if clip is None or clip.is_whole:
+        digits = _digits(picture, room)
+        if digits <= room.digits or all(_is_held(strip, room) for strip in _straight(picture)):
+            return ""
+        named = f"{16 if digits == HALF_DIGITS else 32}-bit floats" if picture.linear else f"{digits}"
+    elif room.kind is None:
+        return ""  # of a video among videos it is told beside the resolution of its colours: `unheld_of_clip`
     else:
-        digits = picture.bits if not picture.linear else HALF_DIGITS if picture.half else FLOAT_DIGITS
-        named = f"{16 if picture.half else 32}-bit floats" if picture.linear else f"{picture.bits}"
-    if digits <= room.digits or (clip is None and all(_is_held(strip, room) for strip in _straight(picture))):
-        return ""
+        digits = depth_of(clip.pixel_format)[0]
+        if digits <= room.digits:
+            return ""
+        named = f"{digits}"
     return f"holds {room.bits}{'-bit floats' if room.is_float else ' bits a channel'} and not the picture's {named}"
+
+
+def _digits(picture: Picture, room: Room) -> int:
+    """How many binary ones the values of a picture need, as far as it matters for a room."""
+    most = 8 if picture.bits == 8 else 16 if not picture.linear else HALF_DIGITS if picture.half else FLOAT_DIGITS
+    fewer = {16: (8, 10, 12), FLOAT_DIGITS: (HALF_DIGITS,)}.get(most, ())
+    if most <= room.digits:
+        return most
+    return next((digits for digits in fewer if all(_has(strip, digits) for strip in _strips(picture))), most)
+
+
+def _has(strip: np.ndarray, digits: int) -> bool:
+    """Whether values of 16 bits are fewer ones spread, or floats are halves."""
+    if strip.dtype == np.float32:
+        with np.errstate(over="ignore"):
+            return bool(np.array_equal(strip.astype(np.float16), strip, equal_nan=True))
+    return bool(np.array_equal(_fewer(strip, digits), strip))
+
+
+def _fewer(values: np.ndarray, digits: int) -> np.ndarray:
+    """Values of 16 bits as they are once they have been of fewer."""
+    top = 2**digits - 1
+    return ((values.astype(np.uint64) * top + 32767) // 65535 * 65535 // top).astype(np.uint16)
 
 
 def _is_held(strip: np.ndarray, room: Room) -> bool:
@@ -142,10 +168,8 @@ def _is_held(strip: np.ndarray, room: Room) -> bool:
     if room.is_float:
         there = as_half(to_bits(strip, 32)).astype(np.float32)
         strip = np.clip(strip, -LARGEST_HALF, LARGEST_HALF) if bits == 32 else strip
-    elif room.bits in (8, 16):
-        there = to_bits(strip, room.bits, dither=False)
     else:
-        return False
+        there = _fewer(to_bits(strip, 16), room.bits)
     return bool(np.array_equal(to_bits(there, bits, dither=False), strip))
 
 
@@ -186,7 +210,7 @@ def _alpha(picture: Picture, room: Room) -> str:
 
 def _unseen(picture: Picture, room: Room) -> str:
     """Colours where alpha is 0: light without a body where they are multiplied, else what may be uncovered again."""
-    if not picture.has_alpha or not room.has_alpha:
+    if not picture.has_alpha or not (room.has_alpha or picture.premultiplied):
         return ""
     stays = picture.premultiplied and "premultiplied" in room.keeps and _is_as_deep(picture, room)
     if stays or (not picture.premultiplied and not (room.kind and room.kind.multiplied)):
@@ -221,7 +245,9 @@ def _icc(picture: Picture, room: Room) -> str:
 
 
 def _chunks(picture: Picture, room: Room) -> str:
-    told = [] if "chunks" in room.keeps else png.unusual(picture.chunks, picture.icc is not None)
+    if "chunks" in room.keeps or (room.kind is None and b"cICP" in picture.chunks):
+        return ""  # a video that cannot tell it is refused: `check_colours_of_picture`
+    told = png.unusual(picture.chunks, picture.icc is not None)
     return f"cannot tell the picture's {' and '.join(told)}" if told else ""
 
 
@@ -333,21 +359,23 @@ class Losses:
             told.append(f"lacks the picture's {', its '.join(parts)}")
         if not told:
             return ""
-        better = next(filter(self._holds_all, BETTER), None)
+        is_picture = not self.how.animated or is_sequence(self.path)
+        better = next(filter(self._holds_all, BETTER if is_picture else BETTER_MOVING), None)
         mend = f"; write {better} to keep {'all of it' if len(self._found) > 1 else 'it'}" if better else ""
         return f"{Path(self.path).name} {'; it '.join(told)}{mend}"
 
     def _holds_all(self, ending: str) -> bool:
         """Whether a file of another kind would hold what this one does not."""
-        is_picture = not self.how.animated or is_sequence(self.path)
-        if ending == Path(self.path).suffix.lower() or ending not in (FORMATS if is_picture else ANIMATIONS):
+        if ending == Path(self.path).suffix.lower():
             return False
         other, how = Path(self.path).with_suffix(ending), replace(self.how, bits=None, codec=None)
         try:
-            return not any(
-                TABLE[key](picture, room_of(other, picture, how)) for key, (_, picture) in self._found.items()
-            )
-        except UserError:  # an encoder that is not there
+            for key, (_, picture) in self._found.items():
+                check_colours_of_picture(other, None, picture, how.animated)
+                if TABLE[key](picture, room_of(other, picture, how)):
+                    return False
+            return True
+        except UserError:  # colours that it cannot tell, an encoder that is not there
             return False
 
 

@@ -317,8 +317,7 @@ def test_overscan_that_has_no_place_is_told(device: Device, tmp_path: Path):
     assert found.channels["Z"].shape == (80, 112)
     (said,) = rendered(device, source, tmp_path / "o.png")
     assert said == (
-        "o.png holds 16 bits a channel and not the picture's 32-bit floats; "
-        "it lacks the picture's overscan (6 px beyond the display window); "
+        "o.png lacks the picture's overscan (6 px beyond the display window); "
         "it begins at 0, 0 and not at 10, 20 as the display window; "
         "it lacks the picture's channel Z; write .exr to keep all of it"
     )
