@@ -359,15 +359,15 @@ class Losses:
             told.append(f"lacks the picture's {', its '.join(parts)}")
         if not told:
             return ""
-        is_picture = not self.how.animated or is_sequence(self.path)
-        better = next(filter(self._holds_all, BETTER if is_picture else BETTER_MOVING), None)
+        is_picture, own = not self.how.animated or is_sequence(self.path), Path(self.path).suffix.lower()
+        kinds = [own] * (self.how.bits is not None) + [*(BETTER if is_picture else BETTER_MOVING)]
+        better = next(filter(self._holds_all, kinds), None)
+        better = "it with more bits" if better == own else better
         mend = f"; write {better} to keep {'all of it' if len(self._found) > 1 else 'it'}" if better else ""
         return f"{Path(self.path).name} {'; it '.join(told)}{mend}"
 
     def _holds_all(self, ending: str) -> bool:
-        """Whether a file of another kind would hold what this one does not."""
-        if ending == Path(self.path).suffix.lower():
-            return False
+        """Whether a file of this ending would hold what this one does not, written as is usual."""
         other, how = Path(self.path).with_suffix(ending), replace(self.how, bits=None, codec=None)
         try:
             for key, (_, picture) in self._found.items():

@@ -19,6 +19,7 @@ import OpenEXR
 import pytest
 import tifffile
 from PIL import ExifTags, Image, ImageCms
+from PIL.PngImagePlugin import PngInfo
 
 from app.errors import UserError
 from app.media import ffmpeg
@@ -79,9 +80,10 @@ def seen(path: Path) -> Seen:
         pixels = np.asarray(image.convert("RGBA" if image.has_transparency_data else "RGB"))
     if path.suffix == ".png":
         deep = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+        assert deep is not None
         pixels = deep[..., None] if deep.ndim == 2 else deep[..., [2, 1, 0, 3][: deep.shape[2]]]
         things |= {f"chunk {kind}": data for kind, data in _chunks(path).items() if kind in ("cICP", "gAMA")}
-    return Seen(pixels / np.iinfo(pixels.dtype).max, things=things)
+    return Seen(pixels / (65535 if pixels.dtype == np.uint16 else 255), things=things)
 
 
 def _pillow(image: Image.Image) -> dict[str, Any]:
@@ -165,6 +167,7 @@ def _frame(path: Path) -> Seen:
     command = [ffmpeg.executable(), *decoder, "-i", str(path), "-frames:v", "1", "-pix_fmt", "rgba64be"]
     done = subprocess.run([*command, "-c:v", "png", "-f", "image2pipe", "-"], check=True, capture_output=True)
     pixels = cv2.imdecode(np.frombuffer(done.stdout, np.uint8), cv2.IMREAD_UNCHANGED)
+    assert pixels is not None
     told = re.search(r"Video: .*", done.stderr.decode())
     assert told
     deep = re.search(r"(\d+)le", told[0])
@@ -336,7 +339,7 @@ def press(path: Path) -> Made:
 
 @source(".png")
 def adorned(path: Path) -> Made:
-    info = __import__("PIL.PngImagePlugin", fromlist=["PngInfo"]).PngInfo()
+    info = PngInfo()
     info.add_text("Author", "A. Painter")
     info.add_itxt("Title", "Eine Tasse, hübsch")
     info.add_itxt("XML:com.adobe.xmp", XMP.decode())
@@ -384,7 +387,7 @@ def linear(path: Path) -> Made:
 @source(".png")
 def odd_texts(path: Path) -> Made:
     """Names that mean something else in an EXR, and more than a JPEG holds."""
-    info = __import__("PIL.PngImagePlugin", fromlist=["PngInfo"]).PngInfo()
+    info = PngInfo()
     for name in ("channels", "screenWindowWidth", "name"):
         info.add_text(name, "a text")
     info.add_text("Comment", "long" * 20000)
@@ -397,7 +400,7 @@ def odd_texts(path: Path) -> Made:
 def long_exif(path: Path) -> Made:
     made = exif()
     made[0x010E] = "long" * 20000
-    info = __import__("PIL.PngImagePlugin", fromlist=["PngInfo"]).PngInfo()
+    info = PngInfo()
     info.add_itxt("XML:com.adobe.xmp", (XMP + b" " * 70000).decode())
     Image.fromarray(smooth()).save(path, pnginfo=info, exif=made)
     return CAMERA | {
