@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import sys
+from collections import Counter
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -359,17 +360,21 @@ def _part(frames: str | None) -> tuple[int, int | None]:
 
 
 def _perform_many(tasks: Sequence[Piece], jobs: int, cluster: str | None) -> None:
-    """Do all, with a line about each that fails."""
+    """Do all, with a line about each that fails; what is to be said of several is said of the first, and counted."""
     from app.progress import leave, on_terminal
     from app.work.batch import run_batch
+    from app.work.tasks import NAME
     from app.work.worker import Outcome
 
-    written = 0
+    written, repeated = 0, Counter[str]()
 
     def report(outcome: Outcome) -> None:
         nonlocal written
         written += not outcome.error
-        _tell(*(_about(outcome.label, said) for said in (outcome.error, *outcome.notices, outcome.verdict) if said))
+        alike = {said: said.replace(Path(outcome.label).stem, NAME) for said in outcome.notices}
+        new = [said for said in outcome.notices if alike[said] not in repeated]
+        repeated.update(alike.values())
+        _tell(*(_about(outcome.label, said) for said in (outcome.error, *new, outcome.verdict) if said))
 
     alone = jobs == 1 or cluster is not None  # no processes of ours, which would have to be waited for
     try:
@@ -377,6 +382,7 @@ def _perform_many(tasks: Sequence[Piece], jobs: int, cluster: str | None) -> Non
             failures = run_batch(tasks, report, progress, jobs, cluster, _tell)
     except Cancelled:
         _fail(f"cancelled; {written} of {len(tasks)} pictures are written, nothing is half-written", INTERRUPTED)
+    _tell(*(f"and of {count - 1} more: {said}" for said, count in repeated.items() if count > 1))
     if failures:
         others = "all others are written" if failures < len(tasks) else "none is written"
         raise UserError(f"{failures} of {len(tasks)} pictures failed; {others}")

@@ -282,7 +282,7 @@ def unheld_of_clip(
     if container.passes > 1:
         room, kept = 8, "4:4"  # by way of a lossless file
     else:
-        options = container.encoding(codec)(Stream(clip.alpha, clip.bits, colours=clip.colours))
+        options = container.encoding(codec)(Stream(clip.alpha, min(clip.bits, 16), colours=clip.colours))
         room, kept = depth_of(options[options.index("-pix_fmt") + 1])
     bits, chroma = depth_of(clip.pixel_format)
     losses += [f"its {bits} bits a channel become {room}"] if bits > room and not clip.is_whole else []

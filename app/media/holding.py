@@ -20,7 +20,7 @@ from app.media.encoders import ANIMATIONS, Stream, check_colours_of_picture, dep
 from app.media.files import is_sequence
 from app.media.formats import Format, fits_profile, picture_format, profile_name, written_depth
 from app.media.losses import REC709, counted, few
-from app.model.picture import Picture, linear_to_srgb, unpremultiplied
+from app.model.picture import Picture, srgb_to_linear, unpremultiplied
 
 PNG_STEP = png.METRE  # PNG tells whole dots a metre, and no 72 an inch
 HALF_DIGITS, FLOAT_DIGITS = 11, 24  # significant binary ones (IEEE 754)
@@ -173,26 +173,51 @@ def _is_held(strip: np.ndarray, room: Room) -> bool:
     return bool(np.array_equal(to_bits(there, bits, dither=False), strip))
 
 
-def _range(picture: Picture, room: Room) -> str:
-    if not picture.linear or (room.is_float and room.bits == 32):
+def _most(room: Room) -> float:
+    """The largest code of a value."""
+    return 2.0**room.bits - 1
+
+
+def _is_cut(picture: Picture, room: Room) -> bool:
+    """Whether values are cut to whole numbers from black to white."""
+    return picture.linear and not room.is_float
+
+
+def _below(picture: Picture, room: Room) -> str:
+    """Values that are rounded to a code below 0, if there were one."""
+    least = -0.5 / _most(room)
+    if not _is_cut(picture, room) or not any(_passes(strip, _light(least), least, -1) for strip in _straight(picture)):
         return ""
-    below = above = nowhere = False
-    for strip in _straight(picture):
-        if room.is_float:
-            finite = strip[np.isfinite(strip)]
-            if (np.abs(finite) >= LARGEST_HALF).any():
-                return "cuts values beyond 65504"
-            continue
-        most = 2**room.bits - 1
-        colours = picture.pixels.shape[2] - picture.has_alpha
-        codes = strip * np.float32(most)
-        with np.errstate(all="ignore"):
-            codes[..., :colours] = linear_to_srgb(strip[..., :colours]) * most
-        below, above = below or bool((codes <= -0.5).any()), above or bool((codes >= most + 0.5).any())
-        nowhere = nowhere or bool(np.isnan(strip).any())
-    ends = " and ".join(["below 0"] * below + ["above 1"] * above)
-    said = [f"cuts values {ends}"] * (below or above) + ["makes NaN black"] * nowhere
-    return "; it ".join(said)
+    return "below 0"
+
+
+def _above(picture: Picture, room: Room) -> str:
+    """Values that are rounded to a code above that of white, if there were one, or to a half that is infinite."""
+    if picture.linear and room.is_float and room.bits == 16:
+        beyond = ((np.isfinite(strip) & (np.abs(strip) >= LARGEST_HALF)).any() for strip in _strips(picture))
+        return "beyond 65504" if any(beyond) else ""
+    if not _is_cut(picture, room):
+        return ""
+    largest = 1 + 0.5 / _most(room)
+    return "above 1" if any(_passes(strip, _light(largest), largest, 1) for strip in _straight(picture)) else ""
+
+
+def _light(value: float) -> float:
+    return float(srgb_to_linear(np.array(value)))
+
+
+def _passes(strip: np.ndarray, light: float, alpha: float, side: int) -> bool:
+    """Whether colours lie beyond so much light, or alphas beyond that alpha, on one side."""
+    colours = strip.shape[2] - (strip.shape[2] in (2, 4))
+    ends = np.array([light] * colours + [alpha] * (strip.shape[2] - colours), np.float32)
+    with np.errstate(invalid="ignore"):
+        return bool((strip >= ends).any() if side > 0 else (strip <= ends).any())
+
+
+def _nowhere(picture: Picture, room: Room) -> str:
+    if not _is_cut(picture, room) or not any(np.isnan(strip).any() for strip in _strips(picture)):
+        return ""
+    return "makes NaN black"
 
 
 def _alpha(picture: Picture, room: Room) -> str:
@@ -307,7 +332,9 @@ def _attributes(picture: Picture, room: Room) -> str:
 
 TABLE: dict[str, Told] = {
     "bits": _depth,
-    "range": _range,
+    "below": _below,
+    "above": _above,
+    "nowhere": _nowhere,
     "alpha": _alpha,
     "unseen": _unseen,
     "chromaticities": _chromaticities,
@@ -325,6 +352,9 @@ TABLE: dict[str, Told] = {
 """What of a picture may be lost, and how it is told.
 
 Besides `Format.keeps` this is all that is known of what is lost where: a new field of a picture gets a row here."""
+
+CUT = ("below", "above")
+"""Those that are told as where values are cut."""
 
 PARTS = ("exif", "xmp", "texts", "attributes", "layers")
 """Those of which only the names are told, in one list."""
@@ -353,8 +383,11 @@ class Losses:
     @property
     def said(self) -> str:
         """All of it in a sentence, with a kind of file that would hold it; "" if nothing is lost."""
-        told = [self._found[key][0] for key in TABLE if key in self._found and key not in PARTS]
-        parts = [self._found[key][0] for key in PARTS if key in self._found]
+        found = {key: self._found[key][0] for key in TABLE if key in self._found}
+        ends = [said for key, said in found.items() if key in CUT]
+        cut = [f"cuts values {' and '.join(ends)}"] * bool(ends)
+        told = cut + [said for key, said in found.items() if key not in (*PARTS, *CUT)]
+        parts = [said for key, said in found.items() if key in PARTS]
         if parts:
             told.append(f"lacks the picture's {', its '.join(parts)}")
         if not told:
