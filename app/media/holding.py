@@ -26,7 +26,7 @@ PNG_STEP = png.METRE  # PNG tells whole dots a metre, and no 72 an inch
 HALF_DIGITS, FLOAT_DIGITS = 11, 24  # significant binary ones (IEEE 754)
 LARGEST_HALF = 65520.0  # what is less is rounded to a half that is finite
 # What is named first where several hold what is lost, of stills and of animations.
-BETTER, BETTER_MOVING = (".png", ".tif", ".exr", ".webp", ".jpg"), (".mkv", ".mov", ".webm")
+BETTER, BETTER_MOVING = (".png", ".exr", ".tif", ".webp", ".jpg"), (".mkv", ".mov", ".webm")
 VALUES_AT_ONCE = 500_000
 
 
@@ -353,11 +353,11 @@ TABLE: dict[str, Told] = {
 
 Besides `Format.keeps` this is all that is known of what is lost where: a new field of a picture gets a row here."""
 
-CUT = ("below", "above")
-"""Those that are told as where values are cut."""
-
-PARTS = ("exif", "xmp", "texts", "attributes", "layers")
-"""Those of which only the names are told, in one list."""
+HEADS = {
+    "cuts values": (("below", "above"), " and "),
+    "lacks the picture's": (("exif", "xmp", "texts", "attributes", "layers"), ", its "),
+}
+"""What several rows are told with in one: by its first words, which rows, and what is between them."""
 
 
 class Losses:
@@ -383,21 +383,25 @@ class Losses:
     @property
     def said(self) -> str:
         """All of it in a sentence, with a kind of file that would hold it; "" if nothing is lost."""
-        found = {key: self._found[key][0] for key in TABLE if key in self._found}
-        ends = [said for key, said in found.items() if key in CUT]
-        cut = [f"cuts values {' and '.join(ends)}"] * bool(ends)
-        told = cut + [said for key, said in found.items() if key not in (*PARTS, *CUT)]
-        parts = [said for key, said in found.items() if key in PARTS]
-        if parts:
-            told.append(f"lacks the picture's {', its '.join(parts)}")
-        if not told:
+        groups: dict[str, list[str]] = {}
+        for key in filter(self._found.__contains__, TABLE):
+            said, _ = self._found[key]
+            groups.setdefault(next((head for head, (keys, _) in HEADS.items() if key in keys), said), []).append(said)
+        if not groups:
             return ""
-        is_picture, own = not self.how.animated or is_sequence(self.path), Path(self.path).suffix.lower()
-        kinds = [own] * (self.how.bits is not None) + [*(BETTER if is_picture else BETTER_MOVING)]
-        better = next(filter(self._holds_all, kinds), None)
-        better = "it with more bits" if better == own else better
-        mend = f"; write {better} to keep {'all of it' if len(self._found) > 1 else 'it'}" if better else ""
-        return f"{Path(self.path).name} {'; it '.join(told)}{mend}"
+        told = [f"{head} {HEADS[head][1].join(parts)}" if head in HEADS else head for head, parts in groups.items()]
+        return f"{Path(self.path).name} {'; it '.join(told)}{self._mend}"
+
+    @property
+    def _mend(self) -> str:
+        """How it would be kept, if there is a way."""
+        all_of_it = "all of it" if len(self._found) > 1 else "it"
+        own = Path(self.path).suffix.lower()
+        if self.how.bits is not None and self._holds_all(own):
+            return f"; write it with more bits to keep {all_of_it}"
+        kinds = BETTER if not self.how.animated or is_sequence(self.path) else BETTER_MOVING
+        better = next((ending for ending in kinds if ending != own and self._holds_all(ending)), None)
+        return f"; write {better} to keep {all_of_it}" if better else ""
 
     def _holds_all(self, ending: str) -> bool:
         """Whether a file of this ending would hold what this one does not, written as is usual."""

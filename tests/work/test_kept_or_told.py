@@ -8,7 +8,7 @@ import subprocess
 import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -23,11 +23,17 @@ from PIL.PngImagePlugin import PngInfo
 
 from app.errors import UserError
 from app.media import ffmpeg
+from app.media.displacement import Displacement
 from app.media.formats import ONLY_READ, TABLE
+from app.media.holding import unheld
+from app.media.maps import write_map
+from app.media.pictures import read_picture, write_picture
+from app.model.picture import Picture
 from app.progress import Progress
 from app.work.jobs import Outputs
 from app.work.tasks import Edits, Task
 from solver.gl.device import Device
+from support.commands import Run
 
 WIDTH, HEIGHT, ROWS = 80, 64, 22
 RECIPE = 'picture = "p.png"\nduration = 0.1\n[output]\nfps = 10\n[fluid]\ngrid = 16\n'
@@ -683,3 +689,160 @@ def test_every_kind_that_is_read_is_among_the_sources() -> None:
     endings = {name.rsplit(".", 1)[1] for name in SOURCES}
     missing = {kind.name for kind in TABLE if not any(ending[1:] in endings for ending in kind.endings)}
     assert missing <= set(ONLY_READ) - {"JPEG 2000", "SGI", "TGA", "ICO"}  # nothing but 8 bits, of which none is lost
+
+
+# Of several frames, and of several pictures ------------------------------------------------------------------------
+
+
+def plates(folder: Path) -> None:
+    """Frames of which each loses more than the one before it."""
+    pixels = with_alpha(light(np.float16))
+    pixels[..., 3] = 1
+    for number in range(1001, 1005):
+        if number == 1002:
+            pixels[0, 0] = -1
+        if number == 1003:
+            pixels[0, 1], pixels[0, 2, 3] = 5, 0.5
+        if number == 1004:
+            pixels[0, 3] = np.nan
+        exr(folder / f"plate.{number}.exr", pixels, {})
+
+
+@pytest.mark.parametrize("words", [["render", "still.toml"], ["apply", "m.npy"]])
+def test_what_any_frame_loses_is_told_once(tmp_path: Path, fluidwarp: Run, words: list[str]) -> None:
+    plates(tmp_path)
+    (tmp_path / "still.toml").write_text(RECIPE)
+    write_map(tmp_path / "m.npy", Displacement(np.zeros((HEIGHT, WIDTH, 2), np.float32)))
+    depth = "holds 8 bits a channel and not the picture's 16-bit floats; it "
+    ends, nowhere, alpha = "cuts values below 0 and above 1", "makes NaN black", "has no alpha, and is laid over black"
+
+    def told(*more: str) -> str:
+        ran = fluidwarp(tmp_path, *words, "plate.%d.exr", *more)
+        assert ran.returncode == 0, ran.stderr
+        return ran.stderr
+
+    write = "write .exr to keep all of it\n"
+    assert told("-o", "a.%d.jpg") == f"fluidwarp: a.%d.jpg {depth}{ends}; it {nowhere}; it {alpha}; {write}"
+    assert told("-o", "b.%d.png") == f"fluidwarp: b.%d.png {ends}; it {nowhere}; {write}"
+    assert told("-o", "c.%d.png", "--frames", "1001-1002") == (
+        "fluidwarp: c.%d.png cuts values below 0; write .exr to keep it\n"
+    )
+    assert told("-o", "d.%d.exr") == ""
+    assert told("-o", "e.mkv") == f"fluidwarp: e.mkv {ends}; it {nowhere}\n"
+
+
+def test_what_a_clip_has_is_kept_or_told(tmp_path: Path, fluidwarp: Run) -> None:
+    (tmp_path / "still.toml").write_text(RECIPE)
+
+    def clip(name: str, how: str, *options: str) -> None:
+        made = ["-f", "lavfi", "-i", f"testsrc=s={WIDTH}x{HEIGHT}:r=10:d=0.2,{how}", *options]
+        subprocess.run([ffmpeg.executable(), "-v", "error", "-y", *made, str(tmp_path / name)], check=True)
+
+    def told(name: str, output: str) -> str:
+        ran = fluidwarp(tmp_path, "render", "still.toml", name, "-o", output)
+        assert ran.returncode == 0, ran.stderr
+        return ran.stderr.removeprefix("fluidwarp: ").rstrip()
+
+    clip("deep.mkv", "format=yuv420p10le", "-c:v", "ffv1")
+    assert told("deep.mkv", "a.%d.jpg") == (
+        "a.%d.jpg holds 8 bits a channel and not the picture's 10; write .png to keep it"
+    )
+    assert told("deep.mkv", "a.gif") == "deep.mkv: its 10 bits a channel become 8"
+    assert told("deep.mkv", "a.%d.png") == told("deep.mkv", "a.mov") == told("deep.mkv", "a.%d.exr") == ""
+    clip("clear.webm", "format=rgba,colorchannelmixer=aa=0.5,format=yuva420p", "-c:v", "libvpx-vp9")
+    assert told("clear.webm", "b.mp4") == "b.mp4 has no alpha, and is laid over black; write .mkv to keep it"
+    assert told("clear.webm", "b.gif") == (
+        "b.gif makes half-transparent pixels either whole or empty; write .mkv to keep it"
+    )
+    assert told("clear.webm", "b.mov") == told("clear.webm", "b.%d.png") == ""
+
+
+def test_what_many_pictures_lose_alike_is_told_of_the_first(tmp_path: Path, fluidwarp: Run) -> None:
+    (tmp_path / "still.toml").write_text(RECIPE)
+    (tmp_path / "out").mkdir()
+    for number in range(4):
+        Image.fromarray(smooth()).save(tmp_path / f"p{number}.jpg", xmp=XMP if number else b"")
+    names = [f"p{number}.jpg" for number in range(4)]
+    ran = fluidwarp(tmp_path, "render", "still.toml", *names, "-o", "out/{name}.exr")
+    said = "lacks the picture's XMP; write .png to keep it"
+    assert ran.returncode == 0
+    assert ran.stderr == (
+        f"fluidwarp: {tmp_path}/p1.jpg: p1.exr {said}\nfluidwarp: and of 2 more: {{name}}.exr {said}\n"
+    )
+
+
+# Where it ends ------------------------------------------------------------------------------------------------------
+
+
+def test_what_rounds_to_white_or_black_is_not_cut() -> None:
+    for bits, ending in ((8, ".jpg"), (16, ".png")):
+        step = 1 / (2**bits - 1)
+        for value, said in (
+            (1 + step * 2.2, True),  # a code of sRGB is 2.27 times less light at white
+            (1 + step * 1.1, False),
+            (-step / 12, True),
+            (-step / 26, False),
+        ):
+            picture = Picture(np.full((4, 4, 3), value, np.float32))
+            assert ("cuts values" in unheld(f"a{ending}", picture)) == said, (bits, value)
+    thin = np.full((4, 4, 4), 0.001, np.float32)  # divided by alpha it is as good as 1
+    thin[..., 3] *= 1 - 2**-20
+    assert "cuts" not in unheld("a.png", Picture(thin, premultiplied=True))
+
+
+def test_a_half_is_cut_where_it_would_be_infinite() -> None:
+    for value, said in ((65519.0, False), (65520.0, True), (-65520.0, True), (np.inf, False), (np.nan, False)):
+        picture = Picture(np.full((4, 4, 3), value, np.float32))
+        assert ("cuts values beyond 65504" in unheld("a.exr", picture, bits=16)) == said
+        assert not unheld("a.exr", picture)
+
+
+@pytest.mark.parametrize("bits", [8, 10, 12])
+def test_values_of_16_bits_are_told_by_as_many_as_they_have(bits: int) -> None:
+    codes = RNG(bits).integers(0, 2**bits, (16, 16, 3)).astype(np.uint32)
+    picture = Picture((codes * 65535 // (2**bits - 1)).astype(np.uint16))
+    assert ("not the picture's" in unheld("a.jpg", picture)) == (bits > 8)
+    assert bits == 8 or f"and not the picture's {bits};" in unheld("a.jpg", picture)
+    assert ("not the picture's" in unheld("a.exr", picture, bits=16)) == (bits > 11)
+    assert not unheld("a.png", picture)
+
+
+def test_pq_is_refused_where_nothing_tells_it(tmp_path: Path, fluidwarp: Run) -> None:
+    """Stills as clips; a profile tells it too."""
+    (tmp_path / "still.toml").write_text(RECIPE)
+    write_map(tmp_path / "m.npy", Displacement(np.zeros((HEIGHT, WIDTH, 2), np.float32)))
+    cv2.imwrite(str(tmp_path / "hdr.png"), deep(3))
+    chunked(tmp_path / "hdr.png", cICP=PQ)
+    for words in (["render", "still.toml"], ["apply", "m.npy"]):
+        ran = fluidwarp(tmp_path, *words, "hdr.png", "-o", "a.jpg")
+        assert ran.returncode != 0
+        assert "Cannot write a.jpg: it cannot tell that the picture's colours are BT.2020 PQ; write .png" in ran.stderr
+        assert not (tmp_path / "a.jpg").exists()
+    ran = fluidwarp(tmp_path, "render", "still.toml", "hdr.png", "-o", "a.mp4")
+    assert "Cannot write a.mp4: the picture's colours are BT.2020 PQ, and 8 bits are too few" in ran.stderr
+    assert fluidwarp(tmp_path, "render", "still.toml", "hdr.png", "-o", "a.mov").returncode == 0
+    assert seen(tmp_path / "a.mov").things == {"chunk cICP": PQ}
+    Image.fromarray(smooth()).save(tmp_path / "both.png", icc_profile=ICC)
+    chunked(tmp_path / "both.png", cICP=PQ)
+    ran = fluidwarp(tmp_path, "render", "still.toml", "both.png", "-o", "b.jpg")
+    assert ran.returncode == 0
+    assert "b.jpg cannot tell the picture's BT.2020 PQ (cICP)" in ran.stderr
+
+
+def test_a_large_tiff_has_its_exif(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As one of 4 GB is written."""
+    Image.fromarray(smooth()).save(tmp_path / "a.jpg", exif=exif())
+    picture = read_picture(tmp_path / "a.jpg")
+    monkeypatch.setattr(tifffile, "imwrite", partial(tifffile.imwrite, bigtiff=True))
+    write_picture(tmp_path / "a.tif", picture)
+    assert (tmp_path / "a.tif").read_bytes()[2] == 43
+    found = seen(tmp_path / "a.tif").things
+    assert {key: found[key] for key in ("tag Artist", "tag DateTimeOriginal")} == {
+        "tag Artist": "A. Painter",
+        "tag DateTimeOriginal": "2020:01:02 03:04:05",
+    }
+    assert found["tag GPSInfo"]
+    again = read_picture(tmp_path / "a.tif")
+    assert not again.note
+    write_picture(tmp_path / "b.jpg", again)
+    assert seen(tmp_path / "b.jpg").things.keys() >= {"tag Artist", "tag DateTimeOriginal", "tag GPSInfo"}
