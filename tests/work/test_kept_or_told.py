@@ -340,7 +340,7 @@ def press(path: Path) -> Made:
     data = path.read_bytes()
     iptc = b"Photoshop 3.0\0" + b"8BIM\x04\x04\0\0\0\0\0\x08\x1c\x02\x78\0\x03cup"
     path.write_bytes(data[:2] + b"\xff\xed" + struct.pack(">H", len(iptc) + 2) + iptc + data[2:])
-    return {"iptc": always("APP13 Photoshop")}
+    return {"iptc": always(r"APP13 Photoshop 3.0 \(IPTC\)")}
 
 
 @source(".png")

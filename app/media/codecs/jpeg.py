@@ -20,6 +20,7 @@ MARKER = re.compile(rb"\xff[^\x00\xff\xd0-\xd7]")  # in a scan: neither a stuffe
 # Of JFIF (ITU T.871, 10.1): where its unit is in a file, the units, dots an inch for one of each, and the most dots.
 UNIT_AT, INCH, CENTIMETRE, MOST_DOTS = 13, 1, 2, 0xFFFF
 INCHES = {INCH: 1.0, CENTIMETRE: 2.54}
+IPTC = b"8BIM\x04\x04"  # of Photoshop's resources the one that holds it
 MOST_BYTES = 0xFFFF - 2  # of a segment
 XMP_MARK = b"http://ns.adobe.com/xap/1.0/\0"
 # What is kept, of the encoding or a thumbnail, or told as further pictures.
@@ -43,6 +44,8 @@ def _losses(data: bytes, is_many: bool) -> list[str]:
         comments += kind == COMMENT
         if kind in APPLICATION:
             name = data[body : min(at, body + 40)].partition(b"\0")[0].decode("latin-1")
+            if name.startswith("Photoshop") and IPTC in data[body:at]:
+                name += " (IPTC)"
             if name not in UNDERSTOOD:
                 unknown[f"APP{kind - APPLICATION.start} {name}"] = None
     else:
