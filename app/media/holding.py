@@ -25,8 +25,9 @@ from app.model.picture import Picture, srgb_to_linear, unpremultiplied
 PNG_STEP = png.METRE  # PNG tells whole dots a metre, and no 72 an inch
 HALF_DIGITS, FLOAT_DIGITS = 11, 24  # significant binary ones (IEEE 754)
 LARGEST_HALF = 65520.0  # what is less is rounded to a half that is finite
-# What is named first where several hold what is lost, of stills and of animations.
-BETTER, BETTER_MOVING = (".png", ".exr", ".tif", ".webp", ".jpg"), (".mkv", ".mov", ".webm")
+# What is named first where several hold what is lost: of stills, of those with floats, of animations.
+BETTER, BETTER_LIGHT = (".png", ".tif", ".exr", ".webp", ".jpg"), (".exr", ".tif", ".png")
+BETTER_MOVING = (".mkv", ".mov", ".webm")
 VALUES_AT_ONCE = 500_000
 
 
@@ -399,7 +400,9 @@ class Losses:
         own = Path(self.path).suffix.lower()
         if self.how.bits is not None and self._holds_all(own):
             return f"; write it with more bits to keep {all_of_it}"
-        kinds = BETTER if not self.how.animated or is_sequence(self.path) else BETTER_MOVING
+        kinds = BETTER_LIGHT if any(picture.linear for _, picture in self._found.values()) else BETTER
+        if self.how.animated and not is_sequence(self.path):
+            kinds = BETTER_MOVING
         better = next((ending for ending in kinds if ending != own and self._holds_all(ending)), None)
         return f"; write {better} to keep {all_of_it}" if better else ""
 
