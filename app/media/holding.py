@@ -116,8 +116,14 @@ def _strips(picture: Picture) -> Iterator[np.ndarray]:
 
 def _straight(picture: Picture) -> Iterator[np.ndarray]:
     """The pixels as they are before they are cut to whole numbers."""
+    is_multiplied = picture.premultiplied and picture.has_alpha
     for strip in _strips(picture):
-        yield unpremultiplied(strip) if picture.premultiplied and picture.has_alpha else strip
+        yield strip if not is_multiplied or (strip[..., -1] == _opaque(picture)).all() else unpremultiplied(strip)
+
+
+def _opaque(picture: Picture) -> int:
+    """The alpha of a pixel that hides what is below it."""
+    return 1 if picture.linear else np.iinfo(picture.pixels.dtype).max
 
 
 def _depth(picture: Picture, room: Room) -> str:
@@ -151,7 +157,8 @@ def _has(strip: np.ndarray, digits: int) -> bool:
     if strip.dtype == np.float32:
         with np.errstate(over="ignore"):
             return bool(np.array_equal(strip.astype(np.float16), strip, equal_nan=True))
-    return bool(np.array_equal(_fewer(strip, digits), strip))
+    fewer = (strip >> 8) * np.uint16(257) if digits == 8 else _fewer(strip, digits)  # the same, and ten times as fast
+    return bool(np.array_equal(fewer, strip))
 
 
 def _fewer(values: np.ndarray, digits: int) -> np.ndarray:
@@ -166,6 +173,8 @@ def _is_held(strip: np.ndarray, room: Room) -> bool:
     if strip.dtype == np.float32:
         strip = np.nan_to_num(strip)
         strip = strip if room.is_float else np.clip(strip, 0, 1)
+        if ((strip == 0) | (strip == 1)).all():
+            return True
     if room.is_float:
         there = as_half(to_bits(strip, 32)).astype(np.float32)
         strip = np.clip(strip, -LARGEST_HALF, LARGEST_HALF) if bits == 32 else strip
@@ -224,7 +233,7 @@ def _nowhere(picture: Picture, room: Room) -> str:
 def _alpha(picture: Picture, room: Room) -> str:
     if not picture.has_alpha or room.has_partial:
         return ""
-    most = 1 if picture.linear else np.iinfo(picture.pixels.dtype).max
+    most = _opaque(picture)
     for strip in _strips(picture):
         alpha = strip[..., -1]
         if not room.has_alpha and (alpha != most).any():
