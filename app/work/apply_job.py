@@ -235,6 +235,8 @@ class _Applying:
         with ExitStack() as stack:
             pictures: Iterator[tuple[int, Picture]]
             if clip:
+                if not clip.is_whole:
+                    self._look(losses, self.source.picture)  # what belongs to all frames is with the first
                 frames = clip.pictures(outputs.part, kept, progress.cancel, self.notices.append)
                 read = stack.enter_context(prefetch(frames))
                 pictures = ((number, self._look(losses, one)) for number, one in read)

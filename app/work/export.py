@@ -219,6 +219,8 @@ class _Export:
                 take_map = stack.enter_context(in_order(stack.enter_context(writer)))
             kept = Kept(records.values() if self.outputs.resume else [])
             if clip is not None:
+                if not clip.is_whole:
+                    self._look(job.picture)  # what belongs to all frames is with the first
                 pictures = clip.pictures(self.outputs.part, kept, self.progress.cancel, self.pictures.notice)
                 source = stack.enter_context(prefetch(pictures))
                 # Once the fluid has come to its end, the clip goes on with the last warp.

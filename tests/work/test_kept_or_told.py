@@ -757,6 +757,20 @@ def test_what_a_clip_has_is_kept_or_told(tmp_path: Path, fluidwarp: Run) -> None
     assert told("clear.webm", "b.mov") == told("clear.webm", "b.%d.png") == ""
 
 
+@pytest.mark.parametrize("words", [["render", "still.toml"], ["apply", "m.npy"]])
+def test_what_belongs_to_an_animated_picture_is_kept_or_told(tmp_path: Path, fluidwarp: Run, words: list[str]) -> None:
+    (tmp_path / "still.toml").write_text(RECIPE)
+    write_map(tmp_path / "m.npy", Displacement(np.zeros((HEIGHT, WIDTH, 2), np.float32)))
+    further = [Image.fromarray(np.roll(smooth(), shift, 1)) for shift in (1, 2)]
+    options = {"exif": exif(), "icc_profile": ICC, "xmp": XMP, "lossless": True}
+    Image.fromarray(smooth()).save(tmp_path / "a.webp", save_all=True, append_images=further, **options)
+    for output in ("b.mp4", "b.gif", "b.%d.png", "b.%d.exr"):
+        ran = fluidwarp(tmp_path, *words, "a.webp", "-o", output)
+        assert ran.returncode == 0, ran.stderr
+        for key, thing in (CAMERA | {"profile": PROFILE, "xmp": GONE_XMP}).items():
+            assert thing.kept(seen(tmp_path / output)) != bool(re.search(thing.told, ran.stderr)), (key, ran.stderr)
+
+
 def test_what_many_pictures_lose_alike_is_told_of_the_first(tmp_path: Path, fluidwarp: Run) -> None:
     (tmp_path / "still.toml").write_text(RECIPE)
     (tmp_path / "out").mkdir()
