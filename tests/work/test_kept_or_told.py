@@ -605,7 +605,7 @@ def deep_sgi(path: Path) -> Made:
 
 @source(".tga")
 def noted_tga(path: Path) -> Made:
-    Image.fromarray(smooth()).save(path, id_section=b"seen by me, too")
+    Image.fromarray(smooth()).save(path, id_section=b"seen by me")  # of ten letters, as which a PCX begins
     return {"text": always("its text is not kept")}
 
 

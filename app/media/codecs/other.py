@@ -1,4 +1,4 @@
-"""Kinds that are read only, through imageio; some of them, as TGA, have no signature."""
+"""Kinds that are read only, through Pillow; some of them, as TGA, have no signature."""
 
 from __future__ import annotations
 
@@ -19,24 +19,25 @@ from app.model.picture import Picture
 GAP = rb"(?:\s|#[^\n\r]*+)++"  # possessive: each way to split a comment into comments would be tried otherwise
 DEEPEST = rb"P[36]" + GAP + rb"\d++" + GAP + rb"\d++" + GAP + rb"(\d{1,5})"  # of a PPM's header (ppm(5))
 
+PILLOW = {"JPEG 2000": "JPEG2000", "PBM": "PPM", "PGM": "PPM", "PNM": "PPM"}  # its names, where they are others
+KINDS = {"DDS", "ICO", "JPEG2000", "PPM", "PCX", "QOI", "SGI", "TGA"}
 JPEG_2000_BOXES = (b"jP  ", b"ftyp", b"jp2c", b"ihdr", b"bpcc", b"pclr", b"cmap", b"cdef")
 BC6 = (94, 95, 96)  # of DXGI_FORMAT, blocks of floats
 
 
 def read(name: str, file: Path, max_pixels: int) -> Picture:
     """Read the first picture of a file; `name` is what messages call its kind."""
-    import imageio.v3 as iio
     from PIL import Image
 
     Image.MAX_IMAGE_PIXELS = None  # ours is in check_size, and can be raised for a file
     if (deepest := re.match(DEEPEST, start_of(file))) and int(deepest[1]) > 255:
         # it would be read as 8 bits without a word
         raise UserError(f"Cannot read {file}: a {name} of 16-bit colours is not supported; convert it to PNG or TIFF.")
-    # the plugin is named, or imageio takes whichever it can open the file with
-    with iio.imopen(file, "r", plugin="pillow") as opened:
-        height, width = opened.properties(index=0).shape[:2]
-        check_size(file, width, height, max_pixels)
-        pixels = opened.read(index=0)
+    own = PILLOW.get(name, name)
+    # its own kind is tried first: a TGA with a text of ten letters begins as a PCX does
+    with Image.open(file, formats=[own, *sorted(KINDS - {own})]) as image:
+        check_size(file, *image.size, max_pixels)
+        pixels = np.asarray(image.convert(image.palette.mode) if image.mode == "P" and image.palette else image)
     if pixels.dtype == np.int32:  # Pillow's mode for 16-bit grey
         pixels = np.clip(pixels, 0, 65535).astype(np.uint16)
     losses = _LOSSES[name](file) if name in _LOSSES else []
