@@ -6,6 +6,7 @@ import io
 import os
 import struct
 import subprocess
+import time
 import zlib
 from dataclasses import replace
 from pathlib import Path
@@ -511,6 +512,17 @@ def test_the_colours_of_an_avif_are_told(tmp_path: Path):
     assert read_picture(tmp_path / "a.avif").note == ""
 
 
+def test_a_jpeg_2000_of_boxes_without_end_is_read_at_once(tmp_path: Path):
+    import imagecodecs
+
+    whole = imagecodecs.jpeg2k_encode(smooth(3), level=0)
+    path, box = tmp_path / "a.jp2", struct.pack(">I", 8) + b"free"
+    path.write_bytes(whole + box * 1_000_000)
+    start = time.process_time()
+    assert read_picture(path).note == "a.jp2: its box free is not kept"
+    assert time.process_time() - start < 2
+
+
 @pytest.mark.parametrize("ending", [".gif", ".png", ".webp", ".tif", ".jpg", ".avif"])
 def test_further_frames_and_pages_are_told(tmp_path: Path, ending: str):
     path = tmp_path / f"a{ending}"
@@ -887,7 +899,7 @@ def test_noise_fits_into_a_jpeg(tmp_path: Path, quality: int) -> None:
 
 @pytest.mark.parametrize("ending", [".bmp", ".tga", ".ppm", ".pcx", ".sgi", ".qoi", ".dds", ".jp2"])
 def test_other_programs_formats_are_read(tmp_path: Path, ending: str):
-    """Written by Pillow, read through imageio, exactly."""
+    """Written by Pillow, read exactly."""
     y, x = np.mgrid[0:48, 0:64]
     pixels = np.stack([x * 4, y * 5, (x * y) % 256], axis=-1).astype(np.uint8)
     path = tmp_path / f"a{ending}"

@@ -22,6 +22,7 @@ DEEPEST = rb"P[36]" + GAP + rb"\d++" + GAP + rb"\d++" + GAP + rb"(\d{1,5})"  # o
 PILLOW = {"JPEG 2000": "JPEG2000", "PBM": "PPM", "PGM": "PPM", "PNM": "PPM"}  # its names, where they are others
 KINDS = {"DDS", "ICO", "JPEG2000", "PPM", "PCX", "QOI", "SGI", "TGA"}
 JPEG_2000_BOXES = (b"jP  ", b"ftyp", b"jp2c", b"ihdr", b"bpcc", b"pclr", b"cmap", b"cdef")
+MOST_BOXES = 1000  # that are looked at
 BC6 = (94, 95, 96)  # of DXGI_FORMAT, blocks of floats
 
 
@@ -61,11 +62,13 @@ def _boxes(file: Path, within: tuple[int, int] | None = None) -> Iterator[str]:
     with file.open("rb") as stream:
         if within is None and stream.read(4) == b"\xff\x4f\xff\x51":
             return  # a codestream alone
-        while at + 8 <= end:
+        for _ in range(MOST_BOXES):
+            if at + 8 > end:
+                return
             stream.seek(at)
             length, kind, large = struct.unpack(">I4sQ", stream.read(16).ljust(16, b"\0"))
             head, length = (16, large) if length == 1 else (8, length or end - at)
-            if kind == b"jp2h":
+            if kind == b"jp2h" and within is None:
                 yield from _boxes(file, (at + head, min(at + length, end)))
             elif kind == b"colr":
                 stream.seek(at + head)
