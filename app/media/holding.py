@@ -375,14 +375,21 @@ class Losses:
 
     def __init__(self, path: str | os.PathLike[str], how: Written) -> None:
         self.path, self.how = path, how
-        self._found: dict[str, tuple[str, Picture]] = {}
+        self._own = Path(path).suffix.lower()
+        self._found: dict[str, str] = {}
+        self._is_light = False
+        is_picture = not how.animated or is_sequence(path)
+        kinds = {ending for ending in (BETTER if is_picture else BETTER_MOVING) if ending != self._own}
+        self._better = kinds | ({self._own} if how.bits is not None else set())
 
     def look(self, picture: Picture) -> Picture:
         """See what of one is lost; it is given back."""
         room = room_of(self.path, picture, self.how)
+        self._is_light = self._is_light or picture.linear
         for key, told in TABLE.items():
             if key not in self._found and (said := told(picture, room)):
-                self._found[key] = said, replace(picture, note="")
+                self._found[key] = said
+                self._better = {ending for ending in self._better if self._would_hold(ending, key, picture)}
         return picture
 
     @property
@@ -395,7 +402,7 @@ class Losses:
         """All of it in a sentence, with a kind of file that would hold it; "" if nothing is lost."""
         groups: dict[str, list[str]] = {}
         for key in filter(self._found.__contains__, TABLE):
-            said, _ = self._found[key]
+            said = self._found[key]
             groups.setdefault(next((head for head, (keys, _) in HEADS.items() if key in keys), said), []).append(said)
         if not groups:
             return ""
@@ -406,24 +413,18 @@ class Losses:
     def _mend(self) -> str:
         """How it would be kept, if there is a way."""
         all_of_it = "all of it" if len(self._found) > 1 else "it"
-        own = Path(self.path).suffix.lower()
-        if self.how.bits is not None and self._holds_all(own):
+        if self._own in self._better:
             return f"; write it with more bits to keep {all_of_it}"
-        kinds = BETTER_LIGHT if any(picture.linear for _, picture in self._found.values()) else BETTER
-        if self.how.animated and not is_sequence(self.path):
-            kinds = BETTER_MOVING
-        better = next((ending for ending in kinds if ending != own and self._holds_all(ending)), None)
+        kinds = [*(BETTER_LIGHT if self._is_light else ()), *BETTER, *BETTER_MOVING]
+        better = next((ending for ending in kinds if ending in self._better), None)
         return f"; write {better} to keep {all_of_it}" if better else ""
 
-    def _holds_all(self, ending: str) -> bool:
-        """Whether a file of this ending would hold what this one does not, written as is usual."""
+    def _would_hold(self, ending: str, key: str, picture: Picture) -> bool:
+        """Whether a file of this ending, written as is usual, would hold what this one does not."""
         other, how = Path(self.path).with_suffix(ending), replace(self.how, bits=None, codec=None)
         try:
-            for key, (_, picture) in self._found.items():
-                check_colours_of_picture(other, None, picture, how.animated)
-                if TABLE[key](picture, room_of(other, picture, how)):
-                    return False
-            return True
+            check_colours_of_picture(other, None, picture, how.animated)
+            return not TABLE[key](picture, room_of(other, picture, how))
         except UserError:  # colours that it cannot tell, an encoder that is not there
             return False
 
