@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import sys
+from collections import Counter
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -389,11 +390,12 @@ def _part(frames: str | None) -> tuple[int, int | None]:
 
 
 def _perform_many(tasks: Sequence[Piece], jobs: int, cluster: str | None) -> None:
-    """Do all, with a line about each that fails."""
+    """Do all, with a line about each that fails; what is to be said of several is said of the first, and counted."""
     from app.progress import leave, on_terminal
     from app.work.batch import run_batch
+    from app.work.tasks import NAME
 
-    written = 0
+    written, repeated = 0, Counter[str]()
     failed: list[Outcome] = []
 
     def report(outcome: Outcome) -> None:
@@ -401,8 +403,11 @@ def _perform_many(tasks: Sequence[Piece], jobs: int, cluster: str | None) -> Non
         if outcome.error:
             failed.append(outcome)
         written += not outcome.error
+        alike = {said: said.replace(Path(outcome.label).stem, NAME) for said in outcome.notices}
+        new = [said for said in outcome.notices if alike[said] not in repeated]
+        repeated.update(alike.values())
         error = outcome.error if len(failed) == 1 else ""  # the names of all that fail are told at the end
-        _tell(*(_about(outcome.label, said) for said in (error, *outcome.notices, outcome.verdict) if said))
+        _tell(*(_about(outcome.label, said) for said in (error, *new, outcome.verdict) if said))
 
     many = f"{len(tasks)} picture{'s' * (len(tasks) > 1)}"
     alone = jobs == 1 or cluster is not None  # no processes of ours, which would have to be waited for
@@ -411,6 +416,7 @@ def _perform_many(tasks: Sequence[Piece], jobs: int, cluster: str | None) -> Non
             failures = run_batch(tasks, report, progress, jobs, cluster, _tell)
     except Cancelled:
         _fail(f"cancelled; {written} of {many} are written, nothing is half-written", INTERRUPTED)
+    _tell(*(f"and of {count - 1} more: {said}" for said, count in repeated.items() if count > 1))
     if failures and len(tasks) == 1:
         raise typer.Exit(1)
     if failures:

@@ -819,7 +819,8 @@ def test_primaries_that_a_format_cannot_tell_are_told(folder: Path, fluidwarp: R
     write_picture(folder / "aces.exr", Picture(np.ones((48, 64, 3), np.float32), chromaticities=primaries))
     ran = fluidwarp(folder, "render", "a.toml", "aces.exr", "-o", "x.tif")
     assert ran.stderr == (
-        "fluidwarp: x.tif cannot tell the primaries (chromaticities) of the picture, and is read as BT.709\n"
+        "fluidwarp: x.tif cannot tell the primaries (chromaticities) of the picture, and is read as BT.709; "
+        "write .exr to keep it\n"
     )
     assert fluidwarp(folder, "render", "a.toml", "aces.exr", "-o", "x.exr").stderr == ""
 
@@ -828,7 +829,7 @@ def test_primaries_that_a_format_cannot_tell_are_told(folder: Path, fluidwarp: R
 def test_dots_per_inch_that_a_jpeg_cannot_tell_are_told(folder: Path, fluidwarp: Run, words: list[str]):
     write_picture(folder / "p.tif", Picture(np.zeros((48, 64, 3), np.uint8), dpi=(72.5, 72.5)))
     write_map(folder / "m.npy", Displacement(np.zeros((48, 64, 2), np.float32)))
-    told = "fluidwarp: x.jpg says 72 dpi and not 72.5 as the picture: JPEG holds whole numbers\n"
+    told = "fluidwarp: x.jpg says 72 dpi and not 72.5 as the picture: JPEG holds whole numbers; write .png to keep it\n"
     for more, said in ([], told), (["--strip"], ""), (["--dpi", "300"], ""):
         ran = fluidwarp(folder, *words, "p.tif", "-o", "x.jpg", *more)
         assert (ran.returncode, ran.stderr) == (0, said)

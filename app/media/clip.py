@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Mapping
 from contextlib import closing
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -11,6 +11,7 @@ from functools import cached_property
 from pathlib import Path
 
 from app.errors import UserError
+from app.media.losses import USUAL_TRANSFERS, unusual_colours
 from app.media.record import digest_of_file
 from app.model.picture import Picture
 from app.model.timeline import frame_rate
@@ -53,6 +54,18 @@ def coded(colours: Colours) -> dict[bytes, bytes]:
     if colours.is_usual:
         return {}
     return {b"cICP": bytes([CODES[colours.primaries], CODES[colours.transfer], 0, 1])}
+
+
+def uncoded(chunks: Mapping[bytes, bytes]) -> Colours | None:
+    """What the chunk of a PNG tells of its colours, as far as a clip can have them; None if it cannot."""
+    codes = chunks.get(b"cICP")
+    if codes is None or not unusual_colours(codes[0], codes[1]):
+        return USUAL
+    primaries = next((name for name, code in CODES.items() if code == codes[0] and name not in HIGH), None)
+    transfer = next((name for name, code in CODES.items() if code == codes[1] and name in HIGH), "bt709")
+    if primaries is None or (transfer == "bt709" and codes[1] not in USUAL_TRANSFERS):
+        return None
+    return Colours(primaries, transfer, "bt2020nc" if primaries == "bt2020" else "bt709")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,11 +11,12 @@ from pathlib import Path
 
 from app.errors import UserError
 from app.media import ffmpeg
-from app.media.clip import USUAL, Clip, Colours
+from app.media.clip import USUAL, Clip, Colours, uncoded
 from app.media.files import NUMBER, is_sequence, writable
-from app.media.formats import FORMATS, check_picture_output
-from app.media.losses import lost
+from app.media.formats import FORMATS, check_picture_output, fits_profile
+from app.media.losses import lost, unusual_colours
 from app.media.video import NAMES
+from app.model.picture import Picture
 
 
 # What players take a video for. The filters set the tags: the frames' own overrule those given to the encoder.
@@ -276,11 +277,15 @@ def unheld_of_clip(
             losses.append(f"what its sound is spoken in ({', '.join(unknown)}) is not kept")
         if container.even and size is not None and (size[0] % 2 or size[1] % 2):
             losses.append(f"its last pixels are repeated, as {container.name} has no odd sides")
-    if container is None or container.passes > 1:
+    if container is None:
         return lost(clip.path, losses)
-    options = container.encoding(codec)(Stream(clip.alpha, clip.bits, colours=clip.colours))
-    (bits, chroma), (room, kept) = map(_depth, (clip.pixel_format, options[options.index("-pix_fmt") + 1]))
-    losses += [f"its {bits} bits a channel become {room}"] if bits > room else []
+    if container.passes > 1:
+        room, kept = 8, "4:4"  # by way of a lossless file
+    else:
+        options = container.encoding(codec)(Stream(clip.alpha, min(clip.bits, 16), colours=clip.colours))
+        room, kept = depth_of(options[options.index("-pix_fmt") + 1])
+    bits, chroma = depth_of(clip.pixel_format)
+    losses += [f"its {bits} bits a channel become {room}"] if bits > room and not clip.is_whole else []
     losses += [f"its colours of 4:{chroma} become 4:{kept}"] if chroma > kept else []
     return lost(clip.path, losses)
 
@@ -301,22 +306,55 @@ def check_colours(path: str | os.PathLike[str], codec: str | None, clip: Clip, a
     named = " ".join(
         NAMES.get(name, name) for name in (clip.colours.primaries, clip.colours.transfer) if name != "bt709"
     )
-    mend = "write .mov, .mkv, .mp4 with --codec h265, .webm with --codec av1, or name.%04d.png"
     if container is None and suffix == ".png":
         return
-    if container is None or suffix not in (".mp4", ".webm", ".mkv", ".mov"):
-        raise UserError(f"Cannot write {path}: it cannot tell that the colours of {clip.path} are {named}; {mend}.")
-    options = container.encoding(codec)(Stream(clip.alpha, clip.bits, colours=clip.colours))
-    if clip.colours.is_high and _depth(options[options.index("-pix_fmt") + 1])[0] < 10:
-        raise UserError(f"Cannot write {path}: the colours of {clip.path} are {named}, and 8 bits are too few; {mend}.")
+    mend = "write .mov, .mkv, .mp4 with --codec h265, .webm with --codec av1, or name.%04d.png"
+    stream = Stream(clip.alpha, clip.bits, colours=clip.colours)
+    _check_told(path, codec, container, stream, f"the colours of {clip.path} are {named}", mend)
 
 
-def _depth(pixel_format: str) -> tuple[int, str]:
+def check_colours_of_picture(
+    path: str | os.PathLike[str], codec: str | None, picture: Picture, animated: bool = False
+) -> None:
+    """Raise `UserError` if a file cannot tell what a picture's colours are, or has too few bits for their range.
+
+    Where the picture has a profile as well, that may tell it.
+    """
+    codes = picture.chunks.get(b"cICP")
+    if codes is None or not (named := unusual_colours(codes[0], codes[1])):
+        return
+    kind = None if animated and not is_sequence(path) else FORMATS.get(Path(path).suffix.lower())
+    if kind is not None and ("chunks" in kind.keeps or fits_profile(picture, kind)):
+        return
+    container = ANIMATIONS.get(Path(path).suffix.lower()) if kind is None else None
+    colours = uncoded(picture.chunks)
+    mend = "write .png" if kind is not None else "write .mov, .mkv or name.%04d.png"
+    stream = Stream(picture.has_alpha, min(picture.bits, 16), colours=colours or USUAL)
+    _check_told(path, codec, container if colours else None, stream, f"the picture's colours are {named}", mend)
+
+
+def _check_told(
+    path: str | os.PathLike[str], codec: str | None, container: Container | None, stream: Stream, what: str, mend: str
+) -> None:
+    """Raise `UserError` for colours that a file of this kind cannot tell, as only some videos can."""
+    if container is None or Path(path).suffix.lower() not in (".mp4", ".webm", ".mkv", ".mov"):
+        raise UserError(f"Cannot write {path}: it cannot tell that {what}; {mend}.")
+    options = container.encoding(codec)(stream)
+    if stream.colours.is_high and depth_of(options[options.index("-pix_fmt") + 1])[0] < 10:
+        raise UserError(f"Cannot write {path}: {what}, and 8 bits are too few; {mend}.")
+
+
+def depth_of(pixel_format: str) -> tuple[int, str]:
     """Bits a channel of one of ffmpeg's formats, and its chroma subsampling: the digits after the 4."""
     deep = re.search(r"(9|10|12|14|16|48|64)(le|be)$", pixel_format)
     planar = re.search(r"4([0-4])([0-4])p", pixel_format)
     chroma = ":".join(planar.groups()) if planar else "2:0" if pixel_format.startswith("gray") else "4:4"
     return {48: 16, 64: 16}.get(bits := int(deep[1]) if deep else 8, bits), chroma
+
+
+def has_alpha(pixel_format: str) -> bool:
+    """Whether one of ffmpeg's formats has alpha."""
+    return re.match(r"yuva|rgba|bgra|gbrap|ya", pixel_format) is not None
 
 
 def check_output(

@@ -5,17 +5,13 @@ from __future__ import annotations
 import io
 import os
 import re
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
-import numpy as np
-
 from app.errors import UserError
 from app.media.codecs import avif, exr, jpeg, other, pillow, png, tiff, webp
-from app.media.files import is_sequence
-from app.media.losses import REC709, counted, few
 from app.model.picture import Picture
 
 
@@ -33,6 +29,8 @@ class Format:
         codecs: ways to compress that can be asked for, the usual one first.
         held_dpi: the dots an inch that it tells for some, where those are not the same.
         keeps: the fields of a `Picture` besides its pixels that come back from a written file.
+        but: what of such a field does not, by the names in it.
+        multiplied: its colours are multiplied by alpha, whatever the picture's are.
     """
 
     name: str
@@ -47,6 +45,8 @@ class Format:
     codecs: tuple[str, ...] = ()
     held_dpi: Callable[[tuple[float, float]], tuple[float, float]] | None = None
     keeps: frozenset[str] = frozenset()
+    but: Mapping[str, Callable[[Picture], Collection[str]]] = field(default_factory=dict, hash=False)
+    multiplied: bool = False
 
 
 ONLY_READ = {
@@ -54,16 +54,17 @@ ONLY_READ = {
     "PGM": (".pgm",), "PNM": (".pnm",), "PPM": (".ppm",), "QOI": (".qoi",), "SGI": (".sgi",), "TGA": (".tga",),
 }  # fmt: skip
 EMBEDDED = frozenset({"icc", "exif", "xmp"})
-PNG_STEP = png.METRE  # PNG tells whole dots a metre, and no 72 an inch
 HEADER = frozenset({"chromaticities", "texts", "attributes"})
 TABLE = (
     Format(
         "PNG", (".png",), png.read, png.write, rb"\x89PNG\r\n\x1a\n",
         bits=(8, 16), longest=1_000_000, held_dpi=png.held_dpi, keeps=EMBEDDED | {"dpi", "texts", "chunks"},
+        but={"texts": png.unheld_texts},
     ),
     Format(
         "JPEG", (".jpg", ".jpeg"), jpeg.read, jpeg.write, rb"\xff\xd8\xff",
         bits=(8,), alpha=False, longest=65500, held_dpi=jpeg.held_dpi, keeps=EMBEDDED | {"dpi", "texts"},
+        but={"exif": jpeg.unheld_exif, "xmp": jpeg.unheld_xmp, "texts": jpeg.unheld_texts},
     ),
     Format(
         "WebP", (".webp",), webp.read, webp.write, rb"RIFF....WEBP",
@@ -75,11 +76,11 @@ TABLE = (
     ),
     Format(
         "TIFF", (".tif", ".tiff"), tiff.read, tiff.write, rb"II[*+]\0|MM\0[*+]",
-        bits=(8, 16, 32), keeps=EMBEDDED | {"dpi", "premultiplied"},
+        bits=(8, 16, 32), keeps=EMBEDDED | {"dpi", "premultiplied"}, but={"exif": tiff.unheld_exif},
     ),
     Format(
         "OpenEXR", (".exr",), exr.read, exr.write, rb"v/1\x01",
-        bits=(16, 32), codecs=exr.COMPRESSIONS,
+        bits=(16, 32), codecs=exr.COMPRESSIONS, but={"texts": exr.unheld_texts}, multiplied=True,
         keeps=HEADER | {"dpi", "layers", "parts", "group", "half", "wide", "margins", "origin", "premultiplied"},
     ),
     Format("GIF", (".gif",), partial(pillow.read, "GIF"), signature=rb"GIF8[79]a"),
@@ -148,44 +149,14 @@ def profile_name(icc: bytes) -> str:
         return ""
 
 
-def unheld(
-    path: str | os.PathLike[str],
-    picture: Picture,
-    *,
-    with_layers: bool = True,
-    with_margins: bool = True,
-    with_dpi: bool = True,
-    animated: bool = False,
-) -> str:
-    """What of a picture the file `path` does not hold, in a sentence; "" if nothing.
-
-    with_layers, with_margins: whether these were warped, as they are for a still that shows its own pixels.
-    with_dpi: whether its own resolution is written.
-    animated: it holds all frames, unless it is one of a sequence.
-    """
-    own, kind = picture.chromaticities, FORMATS.get(Path(path).suffix.lower())
-    if animated and not is_sequence(path):
-        kind = None
-    keeps, losses = kind.keeps if kind else frozenset[str](), []
-    if own is not None and not np.allclose(own, REC709, atol=1e-3) and "chromaticities" not in keeps:
-        losses.append("cannot tell the primaries (chromaticities) of the picture, and is read as BT.709")
-    if picture.icc and "icc" not in keeps and (name := profile_name(picture.icc)) and "sRGB" not in name:
-        losses.append(f"cannot hold the picture's colour profile ({few([name])}), and is read as sRGB")
-    if picture.layers and not (with_layers and "layers" in keeps):
-        losses.append(f"lacks the picture's {counted('channel', [layer.name for layer in picture.layers])}")
-    if picture.wide is not None and not (with_margins and "wide" in keeps):
-        losses.append(f"lacks the picture's overscan ({max(picture.margins)} px beyond the display window)")
-    if picture.origin != (0, 0) and "origin" not in keeps:
-        losses.append(f"begins at 0, 0 and not at {picture.origin[0]}, {picture.origin[1]} as the display window")
-    if picture.dpi and with_dpi and kind is not None and kind.held_dpi is not None:
-        held = kind.held_dpi(picture.dpi)
-        if not np.allclose(held, picture.dpi, rtol=0, atol=PNG_STEP):
-            losses.append(
-                f"says {_dots(held)} dpi and not {_dots(picture.dpi)} as the picture: {kind.name} holds whole numbers"
-            )
-    return f"{Path(path).name} {'; it '.join(losses)}" if losses else ""
+def fits_profile(picture: Picture, kind: Format) -> bool:
+    """Whether the picture's profile can be written: readers complain of one for grey where there is RGB."""
+    space = b"GRAY" if picture.pixels.shape[2] < 3 and kind.grey else b"RGB "
+    return "icc" in kind.keeps and picture.icc is not None and picture.icc[16:20] == space
 
 
-def _dots(dpi: tuple[float, float]) -> str:
-    """Dots an inch along x and y, or along both."""
-    return " x ".join(f"{value:g}" for value in dict.fromkeys(dpi))
+def written_depth(kind: Format, picture: Picture, bits: int | None = None) -> tuple[int, bool]:
+    """The depth that a picture is written in, 8, 16 or 32, and of 32 whether as half floats; see `write_picture`."""
+    if "half" in kind.keeps:
+        return 32, picture.half if bits is None else bits == 16
+    return bits or max((held for held in kind.bits if held <= picture.bits), default=kind.bits[0]), False

@@ -11,7 +11,7 @@ from app.media.codecs.decoding import decoding, head_of
 from app.media.codecs.metadata import printed_at
 from app.media.depth import over, to_bits
 from app.media.files import replacing
-from app.media.formats import TABLE, check_picture_output, kind_of, picture_format
+from app.media.formats import TABLE, check_picture_output, fits_profile, kind_of, picture_format, written_depth
 from app.media.inputs import MAX_PIXELS
 from app.model.picture import Picture
 
@@ -59,16 +59,16 @@ def write_picture(
         picture = picture.stripped()
     if dpi is not None:
         picture = printed_at(picture, dpi)
-    depth = bits or max((held for held in chosen.bits if held <= picture.bits), default=chosen.bits[0])
+    depth, half = written_depth(chosen, picture, bits)
     if "half" in chosen.keeps:
-        picture, depth = replace(picture, half=picture.half if bits is None else bits == 16), 32
+        picture = replace(picture, half=half)
     if depth != picture.bits or "premultiplied" not in chosen.keeps:
         picture = picture.straight()
     picture = replace(picture, pixels=to_bits(picture.pixels, depth))
     if picture.has_alpha and not chosen.alpha:
         picture = replace(picture, pixels=over(picture.pixels, background))
-    if picture.icc and picture.icc[16:20] != (b"GRAY" if picture.pixels.shape[2] < 3 and chosen.grey else b"RGB "):
-        picture = replace(picture, icc=None)  # a profile of the other kind is not allowed, and readers complain
+    if not fits_profile(picture, chosen):
+        picture = replace(picture, icc=None)
     assert chosen.write is not None
     with replacing(path) as temporary:
         chosen.write(temporary, picture, quality, **({} if codec is None else {"codec": codec}))

@@ -271,7 +271,7 @@ def in_words(said: str) -> str:
 def heading(said: str) -> str:
     """The same with a capital, unless it begins with the name of a file."""
     words = in_words(said)
-    return words if "." in words.split(" ", 1)[0] else f"{words[:1].upper()}{words[1:]}"
+    return words if re.match(r"\S*\.|[^.:;,]*\.[a-z][a-z0-9]{1,4}\b", words) else f"{words[:1].upper()}{words[1:]}"
 
 
 def _short(seconds: float) -> float:

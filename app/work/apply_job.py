@@ -7,7 +7,7 @@ from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -16,9 +16,10 @@ from app.media import maps
 from app.media.animation import Frame, animation_writer
 from app.media.clip import WHOLE, rate_of
 from app.media.displacement import Displacement, PixelPlaces, cropped, folds
-from app.media.encoders import check_colours, check_output, passes, unheld_of_clip
+from app.media.encoders import check_colours, check_colours_of_picture, check_output, passes, unheld_of_clip
 from app.media.files import check_kept, check_numbers, is_sequence, numbered_files, stands_for_files, writable
-from app.media.formats import picture_format, unheld
+from app.media.formats import picture_format
+from app.media.holding import Losses, Written
 from app.media.inputs import MAX_PIXELS
 from app.media.maps import Kind, read_map
 from app.media.record import Record, digest_of, digest_of_file
@@ -119,6 +120,7 @@ class Application(Piece):
         check_output(self._output, animated=self.outputs.animated, size=self._size(source.picture))
         if source.clip is not None:
             check_colours(self._output, self.outputs.codec, source.clip, self.outputs.is_animation)
+        check_colours_of_picture(self._output, self.outputs.codec, source.picture, self.outputs.is_animation)
         if self.outputs.is_animation != (self.maps.is_sequence or source.clip is not None):
             what = "a still" if not self.outputs.is_animation else "an animation"
             mend = "write f.%04d.png or .mp4" if not self.outputs.is_animation else "write a picture, such as out.png"
@@ -156,14 +158,25 @@ class _Applying:
         steps = steps_for(self.size)
         self.progress.total = 2 * steps
         given, picture = self._map(self._files[0]), self.source.picture
-        keeps_dpi = self.outputs.keeps_dpi
-        self.notices.append(unheld(self.output, picture, with_margins=self._fits(given, picture), with_dpi=keeps_dpi))
+        losses = self._losses(with_margins=self._fits(given, picture))
+        self._look(losses, picture)
+        self.notices.append(losses.said)
         self.progress.enter("")
         warped = self._warped(given, picture, lambda height: self.progress.parts(steps, height), alpha=True)
         self.progress.enter("writing")
         self.outputs.write(warped, self.order.quality)
         self.progress.count(steps)
         return 1
+
+    def _losses(self, **how: Any) -> Losses:
+        """For what of the pictures the output does not hold; see `Written`."""
+        outputs = self.outputs
+        return Losses(self.output, Written(bits=outputs.bits, codec=outputs.codec, with_dpi=outputs.keeps_dpi, **how))
+
+    def _look(self, losses: Losses, picture: Picture) -> Picture:
+        """See what of a picture is lost, but for what is left out because it was asked to be."""
+        losses.look(picture.stripped() if self.outputs.strip else picture)
+        return picture
 
     def _fits(self, given: Displacement, picture: Picture) -> bool:
         """Whether what lies beyond the display window has a place in the map: in one of the same pixels only."""
@@ -204,15 +217,11 @@ class _Applying:
             if outputs.part != WHOLE:
                 until = max(self._files) if last is None else last
                 check_numbers(order.maps.path, self._files, range(first, until + 1))
-        self.notices.append(
-            unheld(
-                self.output,
-                self.source.picture,
-                animated=True,
-                with_dpi=outputs.keeps_dpi,
-                with_layers=is_own,
-                with_margins=is_own and self._fits(self._map(self._files[min(self._files)]), self.source.picture),
-            )
+        losses = self._losses(
+            animated=True,
+            with_layers=is_own,
+            with_margins=is_own and self._fits(self._map(self._files[min(self._files)]), self.source.picture),
+            clip=clip,
         )
         self.notices += [unheld_of_clip(self.output, outputs.codec, clip, self.size)] if clip else []
         first = max(first, start)
@@ -225,10 +234,14 @@ class _Applying:
         with ExitStack() as stack:
             pictures: Iterator[tuple[int, Picture]]
             if clip:
+                if not clip.is_whole:
+                    self._look(losses, self.source.picture)  # what belongs to all frames is with the first
                 frames = clip.pictures(outputs.part, kept, progress.cancel, self.notices.append)
-                pictures = stack.enter_context(prefetch(frames))
+                read = stack.enter_context(prefetch(frames))
+                pictures = ((number, self._look(losses, one)) for number, one in read)
             else:
                 numbers = [number for number in self._files if first <= number and (last is None or number <= last)]
+                self._look(losses, self.source.picture)
                 pictures = ((number, self.source.picture) for number in numbers if not kept(number))
             writer = animation_writer(
                 self.output,
@@ -240,7 +253,7 @@ class _Applying:
             )
             written = write_all(((n, self._frame(n, one, is_own)) for n, one in pictures), writer, progress)
         progress.expect(-kept.count)
-        self.notices.append(kept.said(written))
+        self.notices += [losses.said, kept.said(written)]
         return written
 
     def _frame(self, number: int, picture: Picture, is_own: bool) -> Frame:

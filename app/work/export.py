@@ -26,7 +26,8 @@ from app.media.depth import mixed
 from app.media.displacement import Displacement
 from app.media.encoders import passes, unheld_of_clip
 from app.media.files import is_sequence, replacing, telling
-from app.media.formats import picture_format, unheld
+from app.media.formats import picture_format
+from app.media.holding import Losses, Written
 from app.media.maps import map_writer, write_map
 from app.media.record import Record, digest_of
 from app.model.handles import ARRIVED
@@ -109,6 +110,7 @@ class _Export:
         self.like = replace(like, premultiplied=False) if job.recipe.mode == "density" else like
         self.written: list[Path] = []
         self.sentinel = Sentinel(job.recipe.stop, job.recipe.fluid.dt)
+        self.losses = Losses(self.outputs.file, self._written) if self.outputs.file is not None else None
         self.numbers: list[dict[str, Any]] = []
         self.dissolves: dict[int, Dissolve] = {}
         self._position: Fraction | None = None
@@ -140,6 +142,7 @@ class _Export:
             self._go_to(Fraction(end))
             if outputs.file is not None:
                 steps = steps_for(self.size)
+                self._look(self.like)
                 picture = self._still(self.like, lambda height: self.progress.parts(steps, height))
                 self.progress.enter("writing")
                 outputs.write(picture, recipe.output.quality)
@@ -180,7 +183,7 @@ class _Export:
         if any(each.helped for each in missed):
             self.pictures.notice(ANEW)
         output, clip = self.outputs.file, self.job.clip
-        if output is not None and (said := unheld(output, self.job.picture, **self._along)):
+        if self.losses is not None and (said := self.losses.said):
             self.pictures.notice(said)
         if clip is not None and output and (said := unheld_of_clip(output, self.outputs.codec, clip, self.size)):
             self.pictures.notice(said)
@@ -225,12 +228,15 @@ class _Export:
                 take_map = stack.enter_context(in_order(stack.enter_context(writer)))
             kept = Kept(records.values() if self.outputs.resume else [])
             if clip is not None:
+                if not clip.is_whole:
+                    self._look(job.picture)  # what belongs to all frames is with the first
                 pictures = clip.pictures(self.outputs.part, kept, self.progress.cancel, self.pictures.notice)
                 source = stack.enter_context(prefetch(pictures))
                 # Once the fluid has come to its end, the clip goes on with the last warp.
-                at = ((number, shown[min(moment(number), len(shown) - 1)], one) for number, one in source)
+                at = ((number, shown[min(moment(number), len(shown) - 1)], self._look(one)) for number, one in source)
                 frames = self._frames(at, take_map)
             else:
+                self._look(job.picture)
                 missing = [(number, position) for number, position in enumerate(wanted, first) if not kept(number)]
                 frames = self._frames_of_picture(missing, take_map)
             written = write_all(frames, self._writer(first, records) if file is not None else None, self.progress)
@@ -375,9 +381,23 @@ class _Export:
         return self._has_layers and self.size == (self.job.picture.width, self.job.picture.height)
 
     @property
-    def _along(self) -> dict[str, bool]:
-        told = {"with_layers": self._has_layers, "with_margins": self._has_margins}
-        return told | {"with_dpi": self.outputs.keeps_dpi, "animated": self.job.has_frames}
+    def _written(self) -> Written:
+        outputs, job = self.outputs, self.job
+        return Written(
+            bits=outputs.bits,
+            codec=outputs.codec,
+            animated=job.has_frames,
+            with_layers=self._has_layers,
+            with_margins=self._has_margins,
+            with_dpi=outputs.keeps_dpi,
+            clip=job.clip if job.has_frames else None,
+        )
+
+    def _look(self, picture: Picture) -> Picture:
+        """See what of a picture the output does not hold, but for what is left out because it was asked to be."""
+        if self.losses is not None:
+            self.losses.look(picture.stripped() if self.outputs.strip else picture)
+        return picture
 
     def _still(self, picture: Picture, parts: Callable[[int], Callable[[int], None]]) -> Picture:
         """A picture warped by the map as it is, with all that is written of it; for `parts` see `Progress`."""

@@ -12,9 +12,9 @@ from pathlib import Path
 
 from app.errors import UserError
 from app.media.animation import AnimationOptions
-from app.media.clip import WHOLE, Clip, FrameRange, rate_of
+from app.media.clip import USUAL, WHOLE, Clip, FrameRange, rate_of, uncoded
 from app.media.codecs.jpeg import held_dpi
-from app.media.encoders import check_colours, check_output, is_animation
+from app.media.encoders import check_colours, check_colours_of_picture, check_output, is_animation
 from app.media.files import cannot_write, is_sequence, writable
 from app.media.formats import picture_format
 from app.media.inputs import MAX_PIXELS
@@ -133,6 +133,7 @@ class Outputs:
             bits=self.bits,
             frames=None if last is None else last + 1 - first,
             like=like.stripped() if self.strip else like,
+            colours=uncoded(like.chunks) or USUAL,
             resumed=self.resume,
         )
         if clip is None:
@@ -143,7 +144,7 @@ class Outputs:
             durations=clip.lengths(self.part),
             sound=clip.path if clip.sound else None,
             sound_from=float((first - clip.start) / rate) + clip.late,
-            colours=clip.colours,
+            colours=how.colours if clip.colours.is_usual else clip.colours,
             timecode=clip.timecode_at(first),
         )
 
@@ -221,6 +222,7 @@ class Job:
             )
             if self.clip is not None:
                 check_colours(output, outputs.codec, self.clip, self.is_animation)
+            check_colours_of_picture(output, outputs.codec, self.picture, self.is_animation)
         if maps is not None:
             check_map(maps.path)
             self._check_map_size(maps)

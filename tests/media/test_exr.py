@@ -172,9 +172,15 @@ def test_light_rings_below_zero_unless_that_is_limited(tmp_path: Path, fluidwarp
 
 def test_what_an_output_cannot_hold_is_told_in_a_line(device: Device, tmp_path: Path):
     source, _ = a_shot(tmp_path / "shot.exr")
-    lost = "lacks the picture's channels Z, diffuse.G, diffuse.R, instance.id and 7 more"
-    assert rendered(device, source, tmp_path / "out.png") == (f"out.png {lost}",)
-    assert rendered(device, source, tmp_path / "f.%02d.exr", codec="none") == (f"f.%02d.exr {lost}",)
+    lost = "channels Z, diffuse.G, diffuse.R, instance.id and 7 more"
+    attributes = "attributes a name of more than thirty-one letters, framesPerSecond, multiView, screenWindowCenter"
+    assert rendered(device, source, tmp_path / "out.png") == (
+        f"out.png cuts values above 1; it lacks the picture's {attributes} and 4 more, its {lost}; "
+        "write .exr to keep all of it",
+    )
+    assert rendered(device, source, tmp_path / "f.%02d.exr", codec="none") == (
+        f"f.%02d.exr lacks the picture's {lost}",
+    )
     (frame,) = read_exr(tmp_path / "f.00.exr")
     assert sorted(frame.channels) == sorted("RGBA")
     grey = dict.fromkeys("RGB", noise(1, np.float32))
@@ -310,8 +316,11 @@ def test_overscan_that_has_no_place_is_told(device: Device, tmp_path: Path):
     assert found.window("dataWindow") == found.window("displayWindow") == (10, 20, 121, 99)
     assert found.channels["Z"].shape == (80, 112)
     (said,) = rendered(device, source, tmp_path / "o.png")
-    assert "lacks the picture's channel Z; it lacks the picture's overscan" in said
-    assert said.endswith("; it begins at 0, 0 and not at 10, 20 as the display window")
+    assert said == (
+        "o.png lacks the picture's overscan (6 px beyond the display window); "
+        "it begins at 0, 0 and not at 10, 20 as the display window; "
+        "it lacks the picture's channel Z; write .exr to keep all of it"
+    )
 
 
 def test_data_beside_the_display_window_are_told(tmp_path: Path):
@@ -330,7 +339,7 @@ def test_what_is_made_of_a_picture_as_it_was_is_told(tmp_path: Path):
     colours = {name: noise(number, np.uint32) for number, name in enumerate("RGB")}
     OpenEXR.File({"preview": OpenEXR.PreviewImage(np.zeros((4, 5, 4), np.uint8))}, colours).write(str(path))
     assert read_picture(path).note == (
-        "a.exr: its preview is not kept; its colours of whole numbers (uint) become floats"
+        "a.exr: its preview is not kept; its colours are whole numbers (uint), and are taken for light with white at 1"
     )
     path.write_bytes(mipmapped(np.array([[1, 2], [3, 4]], np.float32), np.array([[2.5]], np.float32)))
     picture = read_picture(path)

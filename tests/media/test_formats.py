@@ -11,7 +11,8 @@ import pytest
 from PIL import Image, ImageCms
 
 from app.media.encoders import ANIMATIONS
-from app.media.formats import FORMATS, TABLE, Format, unheld
+from app.media.formats import FORMATS, TABLE, Format
+from app.media.holding import unheld
 from app.media.pictures import read_picture, write_picture
 from app.model.picture import Layer, Picture
 
@@ -137,8 +138,13 @@ def test_a_colour_profile_that_a_file_cannot_hold_is_told() -> None:
     )
     said = "cannot hold the picture's colour profile (Wide built-in), and is read as sRGB"
     for name, animated in (("a.exr", False), ("a.mp4", True), ("a.webp", True), ("a.gif", True)):
-        assert unheld(name, wide, animated=animated) == f"{name} {said}"
+        mend = "" if animated else "; write .png to keep it"
+        assert unheld(name, wide, animated=animated) == f"{name} {said}{mend}"
         assert unheld(name, replace(wide, icc=usual), animated=animated) == ""
-        assert unheld(name, replace(wide, icc=b"damaged"), animated=animated) == ""
+        damaged = replace(wide, icc=b"damaged")
+        assert unheld(name, damaged, animated=animated) == f"{name} {said.replace('Wide built-in', 'damaged')}"
+    for name in ("a.png", "a.tif"):
+        told = "lacks the picture's colour profile (damaged), which is not for its colours"
+        assert unheld(name, damaged) == f"{name} {told}"
     for name, animated in (("a.png", False), ("a.webp", False), ("a.%04d.png", True)):
         assert unheld(name, wide, animated=animated) == ""

@@ -26,7 +26,8 @@ from app.media.encoders import (
     is_animation,
     unheld_of_clip,
 )
-from app.media.formats import FORMATS, check_picture_output, unheld
+from app.media.formats import FORMATS, check_picture_output
+from app.media.holding import unheld
 from app.media.landmarks import Pairs, read_pairs, write_pairs
 from app.media.losses import unusual_colours
 from app.media.maps import MAP_ENDINGS, holds, read_map, write_map
@@ -129,7 +130,9 @@ def of_losses(folder: Path) -> Iterator[tuple[str, Any]]:
                       chromaticities=(0.68, 0.32, 0.265, 0.69, 0.15, 0.06, 0.3127, 0.329),
                       wide=np.zeros((16, 22, 4), np.float32), margins=(1, 1, 1, 1))  # fmt: skip
     for ending in (*FORMATS, ".mp4"):
-        yield f"unheld {ending}", [unheld(f"a{ending}", layered), unheld(f"a{ending}", layered, with_layers=False)]
+        animated = ending == ".mp4"
+        ways = [unheld(f"a{ending}", layered, with_layers=how, animated=animated) for how in (True, False)]
+        yield f"unheld {ending}", ways
         for bits, size, codec in ((8, None, None), (32, None, None), (None, (20000, 5), None), (None, None, "piz")):
             yield (
                 f"asked {ending}",

@@ -35,7 +35,7 @@ from app.ui.browser import Browser
 from app.ui.canvas import MOVING, shown_pixels
 from app.ui.dialogs import PictureOrMap, Preferring, Unsaved
 from app.ui.events import MIDDLE, RIGHT, Button, CloseWish, Drop, Key, Mods, Move
-from app.ui.export_choices import ANIMATION, KINDS, MAP
+from app.ui.export_choices import ANIMATION, KINDS, MAP, PICTURE
 from app.ui.export_dialog import ExportDialog, StillExporting
 from app.ui.files import fresh_recipe, load_any
 from app.ui.key_sheet import KeySheet
@@ -1616,6 +1616,21 @@ def test_what_of_a_file_is_lost_is_told_when_it_is_opened_and_not_again(robot: R
     robot.editor.exports.start(export_dialog(robot, tmp_path).job())
     robot.until(lambda: not robot.editor.exports.is_running)
     assert [message.text for message in robot.editor.messages.shown] == [f"Exported ink warped.png to {tmp_path}"]
+
+
+def test_what_the_exported_file_does_not_hold_is_told(robot: Robot, tmp_path: Path) -> None:
+    light = np.full((48, 64, 3), 2, np.float32)
+    write_picture(tmp_path / "light.exr", Picture(light, texts={"owner": "me"}))
+    robot.editor.open(projects.from_picture(tmp_path / "light.exr", fresh_recipe()))
+    robot.editor.messages.shown.clear()
+    dialog = export_dialog(robot, tmp_path)
+    dialog.choices.format[PICTURE] = next(n for n, kind in enumerate(KINDS[PICTURE][1]) if kind.name == "PNG")
+    robot.editor.exports.start(dialog.job())
+    robot.until(lambda: not robot.editor.exports.is_running)
+    assert [message.text for message in robot.editor.messages.shown] == [
+        f"{dialog.output.name} cuts values above 1; write .exr to keep it",
+        f"Exported {dialog.output.name} to {tmp_path}",
+    ]
 
 
 def test_what_an_export_tells_is_shown(robot: Robot, tmp_path: Path) -> None:

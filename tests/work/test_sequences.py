@@ -175,7 +175,11 @@ def test_what_is_whole_is_not_made_again(folder: Path, fluidwarp: Run):
 
     for change in (["--bits", "16"], ["--bits", "16", "--size", "40"], ["--duration", "0.2"]):
         ran = fluidwarp(folder, "render", "a.toml", *words, *change)
-        assert (ran.returncode, ran.stderr) == (0, "")
+        told = "fluidwarp: w.%04d.exr holds 16-bit floats and not the picture's 32-bit floats; "  # once
+        assert (ran.returncode, ran.stderr) == (
+            0,
+            f"{told}write it with more bits to keep it\n" if "--bits" in change else "",
+        )
     part = fluidwarp(folder, "render", "a.toml", *words, "--duration", "0.2", "--frames", "1002-1003")
     assert part.stderr == "fluidwarp: 2 of 2 frames were whole and are kept\n"
 

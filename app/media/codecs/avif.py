@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import struct
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from app.errors import UserError
 from app.media.codecs import pillow
 from app.media.codecs.decoding import quiet, start_of
+from app.media.codecs.png import coded
 from app.media.losses import unusual_colours
 from app.model.picture import Picture
 
@@ -18,8 +20,9 @@ from app.model.picture import Picture
 def read(file: Path, max_pixels: int) -> Picture:
     """Read an AVIF in its depth."""
     with pillow.opened("AVIF", file, max_pixels) as image:
-        codes = re.search(rb"colrnclx(....)", start_of(file), re.DOTALL)
-        colours = unusual_colours(*struct.unpack(">HH", codes[1])) if codes else ""
+        codes = None if image.info.get("icc_profile") else re.search(rb"colrnclx(....)", start_of(file), re.DOTALL)
+        primaries, transfer = struct.unpack(">HH", codes[1]) if codes else (1, 13)
+        colours = unusual_colours(primaries, transfer)
         losses = [f"its colours are {colours} (nclx) and are treated as sRGB"] if colours else []
         pixels = None
         if (deep := _bits(file)) > 8:
@@ -27,7 +30,8 @@ def read(file: Path, max_pixels: int) -> Picture:
 
             with quiet():  # Pillow gives 8 bits of these without a word
                 pixels = _spread_to_16(imagecodecs.avif_decode(file.read_bytes()), deep)
-        return pillow.picture_of(image, file, losses, pixels)
+        picture = pillow.picture_of(image, file, losses, pixels)
+        return replace(picture, chunks=coded(primaries, transfer)) if colours else picture
 
 
 def _bits(file: Path) -> int:

@@ -32,6 +32,9 @@ SHARED = {"pixelAspectRatio", "timeCode", "chromaticities"}  # which all parts m
 DENSITY, ASPECT = "xDensity", "pixelAspectRatio"
 NUMBERS, CENTRE = ("int", "float"), "screenWindowCenter"  # that a header always has, and OpenEXR writes itself
 
+# What a header says of its own, so that no text of another kind of file can have the name.
+RESERVED = LAYOUT | {*PART_NAMES, DENSITY, ASPECT, CENTRE, "screenWindowWidth", "preview"}
+
 COMPRESSIONS = ("zip", "zips", "piz", "rle", "none", "pxr24", "dwaa", "dwab", "b44", "b44a")
 """What `--codec` may be; those from pxr24 on lose something."""
 
@@ -106,7 +109,7 @@ def read(file: Path, max_pixels: int) -> Picture:
     if turned := [layer.name for layer in layers if any(MOTION.fullmatch(word) for word in layer.name.split("."))]:
         losses.append(f"the arrows of its {counted('channel', turned)} are moved and not turned")
     if any(own.channels[name].dtype == np.uint32 for name in colours):
-        losses.append("its colours of whole numbers (uint) become floats")
+        losses.append("its colours are whole numbers (uint), and are taken for light with white at 1")
     wide = np.stack([own.shown(name, margins) for name in colours], axis=-1, dtype=np.float32)
     left, top, right, bottom = margins
     inside = wide[top : len(wide) - bottom, left : wide.shape[1] - right]
@@ -282,6 +285,22 @@ def place_window(data: np.ndarray, at: tuple[int, int], into: np.ndarray) -> Non
     into[spans[0][0], spans[1][0]] = data[spans[0][1], spans[1][1]]
 
 
+def unheld_texts(picture: Picture) -> list[str]:
+    """The names of texts that have another meaning in a header."""
+    return [key for key in picture.texts if key in RESERVED]
+
+
+def unusual_attributes(attributes: Mapping[str, Any], shape_is_told: bool) -> list[str]:
+    """The names of attributes that say more than every header does; `shape_is_told`: that of a pixel, by its dots."""
+    usual = {"screenWindowWidth": 1.0, CENTRE: (0.0, 0.0), ASPECT: 1.0}
+    placed = {DENSITY, *([ASPECT] if shape_is_told else [])}
+    return [
+        name
+        for name, value in attributes.items()
+        if name not in placed and not (name in usual and np.array_equal(value, usual[name]))
+    ]
+
+
 def write(path: Path, picture: Picture, quality: int, codec: str | None = None) -> None:
     """Write an EXR, its colours multiplied by alpha, with the layers in the parts they are from.
 
@@ -296,7 +315,8 @@ def write(path: Path, picture: Picture, quality: int, codec: str | None = None) 
             pixels = np.concatenate([pixels[..., :-1] * pixels[..., -1:], pixels[..., -1:]], axis=2)
     if picture.half:
         pixels = as_half(pixels)
-    attributes: dict[str, Any] = {**picture.texts, **picture.attributes}
+    texts = {key: text for key, text in picture.texts.items() if key not in RESERVED}
+    attributes: dict[str, Any] = {**texts, **picture.attributes}
     if picture.dpi:
         attributes[DENSITY] = picture.dpi[0]
         if picture.dpi[0] != picture.dpi[1]:  # a picture's own says what is seen, and is not for print alone

@@ -4,19 +4,25 @@ from __future__ import annotations
 
 import re
 import struct
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from app.media.codecs import pillow
+from app.media.codecs.metadata import sized_exif, tag_names
 from app.media.losses import not_kept
 from app.model.picture import Picture
 
 START_OF_SCAN, END, COMMENT = 0xDA, 0xD9, 0xFE
+COMMENT_NAME = "Comment"
 APPLICATION = range(0xE0, 0xF0)
 MARKER = re.compile(rb"\xff[^\x00\xff\xd0-\xd7]")  # in a scan: neither a stuffed byte nor a restart
 # Of JFIF (ITU T.871, 10.1): where its unit is in a file, the units, dots an inch for one of each, and the most dots.
 UNIT_AT, INCH, CENTIMETRE, MOST_DOTS = 13, 1, 2, 0xFFFF
 INCHES = {INCH: 1.0, CENTIMETRE: 2.54}
+IPTC = b"8BIM\x04\x04"  # of Photoshop's resources the one that holds it
+MOST_BYTES = 0xFFFF - 2  # of a segment
+XMP_MARK = b"http://ns.adobe.com/xap/1.0/\0"
 # What is kept, of the encoding or a thumbnail, or told as further pictures.
 UNDERSTOOD = ("JFIF", "JFXX", "Exif", "http://ns.adobe.com/xap/1.0/", "ICC_PROFILE", "MPF", "Adobe", "Ducky")
 
@@ -38,6 +44,8 @@ def _losses(data: bytes, is_many: bool) -> list[str]:
         comments += kind == COMMENT
         if kind in APPLICATION:
             name = data[body : min(at, body + 40)].partition(b"\0")[0].decode("latin-1")
+            if name.startswith("Photoshop") and IPTC in data[body:at]:
+                name += " (IPTC)"
             if name not in UNDERSTOOD:
                 unknown[f"APP{kind - APPLICATION.start} {name}"] = None
     else:
@@ -53,7 +61,13 @@ def write(path: Path, picture: Picture, quality: int) -> None:
     """Write a JPEG, its colours in full resolution."""
     # Not optimized: that gains a few per cent, holds the file in memory once more, and fails where noise makes the
     # file larger than the buffer Pillow guesses.
-    options: dict[str, Any] = {"subsampling": 0, "comment": picture.texts.get("Comment", "")}
+    picture = replace(
+        picture,
+        exif=None if unheld_exif(picture) else picture.exif,
+        xmp=None if unheld_xmp(picture) else picture.xmp,
+    )
+    comment = "" if COMMENT_NAME in unheld_texts(picture) else picture.texts.get(COMMENT_NAME, "")
+    options: dict[str, Any] = {"subsampling": 0, "comment": comment}
     unit = 0
     if picture.dpi:
         unit, *options["dpi"] = _density(picture.dpi)
@@ -62,6 +76,23 @@ def write(path: Path, picture: Picture, quality: int) -> None:
         with path.open("r+b") as file:
             file.seek(UNIT_AT)
             file.write(bytes([unit]))
+
+
+def unheld_exif(picture: Picture) -> list[str]:
+    """The names of all tags if they are more than a segment has room for."""
+    return tag_names(picture.exif) if len(sized_exif(picture)) > MOST_BYTES else []
+
+
+def unheld_xmp(picture: Picture) -> list[str]:
+    """As `unheld_exif`."""
+    return ["XMP"] if picture.xmp and len(XMP_MARK + picture.xmp) > MOST_BYTES else []
+
+
+def unheld_texts(picture: Picture) -> list[str]:
+    """The names of all texts but a comment that a segment has room for."""
+    comment = picture.texts.get(COMMENT_NAME, "")
+    held = COMMENT_NAME if len(comment.encode()) <= MOST_BYTES else None
+    return [name for name in picture.texts if name != held]
 
 
 def held_dpi(dpi: tuple[float, float]) -> tuple[float, float]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Collection
 from dataclasses import replace
 from typing import Any
 
@@ -10,11 +11,38 @@ import numpy as np
 
 from app.model.picture import Picture
 
-ORIENTATION, EXIF_IFD = 0x0112, 0x8769
+ORIENTATION, EXIF_IFD, GPS_IFD, INTEROPERABILITY = 0x0112, 0x8769, 0x8825, 0xA005
 # More dots an inch no fraction of EXIF and TIFF tells, and OpenEXR has no pixel that is longer in comparison.
 MOST_DOTS, NARROWEST = 2.0**31, 1e6
 INCHES = {2: 1.0, 3: 2.54}  # dots an inch for one in each of the units that are lengths
 RESOLUTION = {0x011A: 0, 0x011B: 0, 0x0128: 2}  # EXIF's codes of x, y and their unit; 2 is an inch
+
+
+# What is told elsewhere in a file, or by every EXIF of itself: orientation, resolution, how colours are laid out, its
+# version, components, colour space, size, and where further directories are (CIPA DC-008, 4.6).
+FORMAL = {*RESOLUTION, ORIENTATION, 0x0213, 0x0214, EXIF_IFD, GPS_IFD, INTEROPERABILITY}
+FORMAL_INSIDE = {0x9000, 0x9101, 0xA000, 0xA001, 0xA002, 0xA003, INTEROPERABILITY}
+
+
+def first_names(encoded: bytes | None, but: Collection[int] = ()) -> list[str]:
+    """What the tags of EXIF's first directory are called, without those that say nothing of a picture's own."""
+    from PIL import ExifTags, Image
+
+    exif = Image.Exif()
+    exif.load(encoded or b"")
+    return [ExifTags.TAGS.get(code, f"{code:#06x}") for code in exif if code not in FORMAL and code not in but]
+
+
+def tag_names(encoded: bytes | None) -> list[str]:
+    """What all tags of EXIF are called, without those that say nothing of a picture's own."""
+    from PIL import ExifTags, Image
+
+    if not encoded:
+        return []
+    exif = Image.Exif()
+    exif.load(encoded)
+    inner = [ExifTags.TAGS.get(code, f"{code:#06x}") for code in exif.get_ifd(EXIF_IFD) if code not in FORMAL_INSIDE]
+    return first_names(encoded) + inner + ["GPSInfo"] * bool(exif.get_ifd(GPS_IFD))
 
 
 def upright_dpi(dpi: Any, orientation: int) -> tuple[float, float] | None:

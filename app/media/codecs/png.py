@@ -20,6 +20,7 @@ from app.model.picture import Picture
 UNKEPT_CHUNKS = {b"bKGD": "background colour", b"sBIT": "number of significant bits"}
 COLOUR_CHUNKS = {b"cICP": 4, b"gAMA": 4, b"cHRM": 32, b"sRGB": 1, b"mDCV": 24, b"cLLI": 8}  # and their lengths
 TEXT_CHUNKS = (b"tEXt", b"zTXt", b"iTXt")
+LONGEST_KEYWORD = 79
 # What is kept otherwise, is made anew (tIME, iDOT, hIST), or is of frames that are told themselves.
 UNDERSTOOD = {
     b"IHDR", b"PLTE", b"IDAT", b"tRNS", b"iCCP", b"pHYs", b"eXIf", b"tIME", b"acTL", b"fcTL", b"fdAT", b"iDOT", b"hIST",
@@ -32,7 +33,9 @@ def read(file: Path, max_pixels: int) -> Picture:
     """Read a PNG in its depth."""
     with pillow.opened("PNG", file, max_pixels) as image:
         chunks, unkept = _chunks(file)
-        losses = _colours_lost(chunks, image.info.get("icc_profile") is not None) + unkept
+        colours = unusual(chunks, image.info.get("icc_profile") is not None)
+        losses = [f"its colours are mixed as if sRGB, in spite of its {' and '.join(colours)}"] if colours else []
+        losses += unkept
         if (shape := image.info.get("aspect", (1, 1)))[0] != shape[1]:
             losses.append(f"the shape of its pixels ({shape[0]}:{shape[1]}) is not kept")
         pixels, bits = None, _bits(file)
@@ -78,21 +81,36 @@ def _chunks(file: Path) -> tuple[dict[bytes, bytes], list[str]]:
     return found, losses
 
 
-def _colours_lost(chunks: Mapping[bytes, bytes], has_profile: bool) -> list[str]:
-    """What a PNG tells of its colours, and we do not understand."""
+def coded(primaries: int, transfer: int) -> dict[bytes, bytes]:
+    """The chunk that tells what the colours of RGB are, by the codes of H.273 (11.3.2.6)."""
+    return {b"cICP": bytes([primaries, transfer, 0, 1])} if max(primaries, transfer) < 256 else {}
+
+
+def unusual(chunks: Mapping[bytes, bytes], has_profile: bool) -> list[str]:
+    """What a PNG's chunks tell of its colours, and we do not understand, in words."""
     if codes := chunks.get(b"cICP"):
         colours = unusual_colours(codes[0], codes[1])
-        return [f"its colours are {colours} (cICP), which a PNG keeps, and are mixed as if sRGB"] if colours else []
+        return [f"{colours} (cICP)"] if colours else []
     if has_profile or b"sRGB" in chunks:
         return []
-    kept = []
+    found = []
     if b"gAMA" in chunks and (value := int.from_bytes(chunks[b"gAMA"], "big")) not in USUAL_GAMMA:
-        kept.append(f"gamma of {value / 100000:g} (gAMA)")
+        found.append(f"gamma of {value / 100000:g} (gAMA)")
     if b"cHRM" in chunks:
         x_y = np.frombuffer(chunks[b"cHRM"], ">u4") / 100000
         if not np.allclose(np.roll(x_y, -2), REC709, atol=2e-3):
-            kept.append("primaries (cHRM)")
-    return [f"a PNG alone keeps its {' and '.join(kept)}, and its colours are mixed as if sRGB"] if kept else []
+            found.append("primaries (cHRM)")
+    return found
+
+
+def unheld_texts(picture: Picture) -> list[str]:
+    """The names of texts that a PNG cannot have, and that are changed."""
+    return [key for key in picture.texts if _keyword(key).decode("latin-1") != key]
+
+
+def _keyword(name: str) -> bytes:
+    """A text's name as a PNG can have it (11.3.3.2)."""
+    return name.encode("latin-1", "replace")[:LONGEST_KEYWORD]
 
 
 def write(path: Path, picture: Picture, quality: int) -> None:
@@ -121,7 +139,7 @@ def write(path: Path, picture: Picture, quality: int) -> None:
     if picture.xmp:
         extra.add_itxt("XML:com.adobe.xmp", picture.xmp.decode("utf-8", "replace"))
     for key, text in picture.texts.items():
-        extra.add_itxt(key.encode("latin-1", "replace")[:79], text)
+        extra.add_itxt(_keyword(key), text)
     chunks = io.BytesIO()
     for kind, data, _ in extra.chunks:
         putchunk(chunks, kind, data)

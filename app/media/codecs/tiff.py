@@ -19,9 +19,11 @@ from app.media.codecs import ZLIB_LEVEL
 from app.media.codecs.cmyk import INK, cmyk_to_rgb
 from app.media.codecs.metadata import (
     EXIF_IFD,
+    GPS_IFD,
     INCHES,
     ORIENTATION,
     exif_of,
+    first_names,
     upright,
     upright_dpi,
     upright_exif,
@@ -31,7 +33,8 @@ from app.media.inputs import check_size
 from app.media.losses import lost, not_kept
 from app.model.picture import Picture
 
-DESCRIPTION, GPS_IFD = 0x010E, 0x8825
+DESCRIPTION = 0x010E
+BIG, LONG, LONG8 = 43, 4, 16  # the mark of a BigTIFF, and types of numbers
 # Document, description, make, model, page, software, date, artist, host, copyright: what of a TIFF's first directory is
 # not about its layout.
 TEXTS = (0x010D, DESCRIPTION, 0x010F, 0x0110, 0x011D, 0x0131, 0x0132, 0x013B, 0x013C, 0x8298)
@@ -67,7 +70,6 @@ def _pages(tiff: Any) -> Iterator[Any]:
 def read(file: Path, max_pixels: int, place: int | None = None) -> Picture:
     """Read a page of a TIFF; where none is asked for the first, and what is lost of the others is told."""
     import tifffile
-    from PIL import Image
 
     tifffile.logger().setLevel(logging.CRITICAL)  # what it says of damaged files, it raises too
     with tifffile.TiffFile(file) as tiff:
@@ -85,6 +87,8 @@ def read(file: Path, max_pixels: int, place: int | None = None) -> Picture:
             losses.append(not_kept("tag", unkept))
         pixels = page.asarray()
         photometric = tifffile.PHOTOMETRIC(page.photometric).name
+        place_of_tags, layout = page.offset, (tiff.byteorder, tiff.is_bigtiff)
+    is_half = pixels.dtype == np.float16
     pixels = np.moveaxis(pixels, 0, -1) if page.axes == "SYX" else pixels.reshape(*pixels.shape[:2], -1)
     pixels = plain_depth(file, pixels)
     icc = tags.get(34675)
@@ -104,18 +108,11 @@ def read(file: Path, max_pixels: int, place: int | None = None) -> Picture:
         raise UserError(f"Cannot read {file}: a TIFF in {photometric} is not supported; convert it to RGB.")
 
     premultiplied = tuple(page.extrasamples[:1]) == (tifffile.EXTRASAMPLE.ASSOCALPHA,)
-    exif = Image.Exif()
-    with file.open("rb") as stream:
-        try:
-            exif.load_from_fp(stream)
-            for code in set(exif) - {*TEXTS, ORIENTATION, EXIF_IFD, GPS_IFD}:
-                del exif[code]
-            if LAYOUT.match(str(exif.get(DESCRIPTION, ""))):
-                del exif[DESCRIPTION]
-            encoded = upright_exif(exif)
-        except Exception:  # damaged metadata must not cost the picture
-            encoded = None
-            losses.append("its EXIF is damaged and not kept whole")
+    try:
+        encoded = upright_exif(_exif(file, place_of_tags, layout))
+    except Exception:  # damaged metadata must not cost the picture
+        encoded = None
+        losses.append("its EXIF is damaged and not kept whole")
     orientation = int(tags.get(ORIENTATION, 1))
     unit = INCHES.get(int(tags.get(296, 2)))
     resolution = [tags[code][0] / tags[code][1] for code in (282, 283) if code in tags and tags[code][1]]
@@ -128,8 +125,27 @@ def read(file: Path, max_pixels: int, place: int | None = None) -> Picture:
         xmp=upright_xmp(bytes(tags[700])) if 700 in tags else None,
         dpi=upright_dpi([value * unit for value in resolution], orientation) if unit else None,
         premultiplied=premultiplied,
+        half=is_half,
         note=lost(file, losses),
     )
+
+
+def _exif(file: Path, place: int, layout: tuple[str, bool]) -> Any:
+    """Pillow's EXIF of the directory at `place`; `layout` is the order of bytes, and whether it is a BigTIFF."""
+    from PIL import Image
+
+    exif = Image.Exif()
+    exif.endian, exif.bigtiff = layout
+    with file.open("rb") as stream:
+        exif.load_from_fp(stream, place)
+        for code in set(exif) - {*TEXTS, ORIENTATION, EXIF_IFD, GPS_IFD}:
+            del exif[code]
+        for code in (EXIF_IFD, GPS_IFD):
+            exif.get_ifd(code)  # read while the file is open
+    exif.bigtiff = False  # as which it is written elsewhere
+    if LAYOUT.match(str(exif.get(DESCRIPTION, ""))):
+        del exif[DESCRIPTION]
+    return exif
 
 
 def _palette(table: Any) -> np.ndarray:
@@ -163,6 +179,12 @@ def plain_depth(file: Path, pixels: np.ndarray) -> np.ndarray:
     if kind == "u" and pixels.dtype.itemsize <= 2:
         return pixels.astype(pixels.dtype.newbyteorder("="))
     raise UserError(f"Cannot read {file}: samples of {pixels.dtype} are not supported; convert it to 16 bits.")
+
+
+def unheld_exif(picture: Picture) -> list[str]:
+    """The names of the tags of EXIF's first directory that are not written into a TIFF's."""
+    held = {code for code, value in exif_of(picture).items() if code in TEXTS and isinstance(value, str)}
+    return first_names(picture.exif, held)
 
 
 def write(path: Path, picture: Picture, quality: int) -> None:
@@ -202,26 +224,28 @@ def write(path: Path, picture: Picture, quality: int) -> None:
 def _append_directories(path: Path, directories: Mapping[int, Mapping[int, Any]]) -> None:
     """Put EXIF's own directories at the end of a TIFF, and a first directory that knows them (TIFF 6.0, section 2).
 
-    tifffile writes no directories but those of images.
+    tifffile writes no directories but those of images. A BigTIFF, of 4 GB, has longer numbers.
     """
     from PIL.TiffImagePlugin import ImageFileDirectory_v2
 
     with path.open("r+b") as stream:
-        mark, start = struct.unpack("<4sI", stream.read(8))
-        if mark != b"II*\0":  # a BigTIFF of 4 GB goes without
-            return
+        is_big = stream.read(4)[2] == BIG
+        stream.seek(0)
+        head = stream.read(16 if is_big else 8)
+        number, counter, kind, at = ("Q", "Q", LONG8, 8) if is_big else ("I", "H", LONG, 4)
+        entry, (start,) = f"<HH{number}{number}", struct.unpack_from(f"<{number}", head, at)
         stream.seek(start)
-        (count,) = struct.unpack("<H", stream.read(2))
-        entries = [stream.read(12) for _ in range(count)]
+        (count,) = struct.unpack(f"<{counter}", stream.read(struct.calcsize(counter)))
+        entries = [stream.read(struct.calcsize(entry)) for _ in range(count)]
         for code, values in directories.items():
-            directory = ImageFileDirectory_v2(group=code)
+            directory = ImageFileDirectory_v2(head, group=code)
             for tag, value in values.items():
                 directory[tag] = value
             end = stream.seek(0, os.SEEK_END)
             stream.write(directory.tobytes(end))
-            entries.append(struct.pack("<HHII", code, 4, 1, end))
+            entries.append(struct.pack(entry, code, kind, 1, end))
         end = stream.seek(0, os.SEEK_END)
-        entries.sort(key=lambda entry: struct.unpack("<H", entry[:2]))
-        stream.write(struct.pack("<H", len(entries)) + b"".join(entries) + struct.pack("<I", 0))
-        stream.seek(4)
-        stream.write(struct.pack("<I", end))
+        entries.sort(key=lambda entry: struct.unpack_from("<H", entry))
+        stream.write(struct.pack(f"<{counter}", len(entries)) + b"".join(entries) + struct.pack(f"<{number}", 0))
+        stream.seek(at)
+        stream.write(struct.pack(f"<{number}", end))
