@@ -11,7 +11,7 @@ from app.model.recipe import FluidSettings
 from app.model.strokes import BrushPath, Dab
 from solver.brush.brush import Brush, Motion
 from solver.brush.masks import Masks
-from solver.brush.push import Push, coasting, gain_compensation, slip_factor, strain_limit
+from solver.brush.push import Push, coasting, gain_compensation, quick_slip, slip_factor, strain_limit
 from solver.brush.tip import Path, Tip
 from solver.brush.twirl import Twirl
 from solver.gl.device import Device
@@ -75,7 +75,8 @@ class Brushwork:
             case "push":
                 far = stroke.travelled(tick, scene.extent) / stroke.radius
                 on = coasting(whole, dt, scene.settings.drag, scene.settings.viscosity)
-                self._lead(scene, Push(whole, dt, pressed, slip_factor(far, on), strain_limit(far, on), stroke.local))
+                slip = min(slip_factor(far, on), quick_slip(whole))
+                self._lead(scene, Push(whole, dt, pressed, slip, strain_limit(far, on), stroke.local))
             case "curve":
                 for tip, amount in tips:
                     length = hypot(tip.end[0] - tip.start[0], tip.end[1] - tip.start[1])

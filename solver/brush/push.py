@@ -74,6 +74,12 @@ def slip_factor(travelled: float, coasting: float = 0.0) -> float:
     return by_path * FARTHEST_COASTING / max(coasting, FARTHEST_COASTING)
 
 
+def quick_slip(tip: Tip) -> float:
+    """The most of its speed that a push gives whose tip goes its whole way in one step: the fifth law."""
+    far = math.dist(tip.start, tip.end)
+    return LONGEST_STEP * tip.radius / far if far else math.inf
+
+
 def strain_limit(travelled: float, coasting: float) -> float:
     """The part of the most strain at which a push slips, `travelled` radii after its stroke began: the third law.
 
@@ -131,10 +137,8 @@ class Push:
 
     @property
     def velocities(self) -> list[Point]:
-        """What its images give: against the drag at the whole speed, and no stronger than along it; laws 1 and 5."""
-        far = math.dist(self.tip.start, self.tip.end)
-        most = LONGEST_STEP * self.tip.radius / far if far else math.inf
-        speed = math.copysign(min(abs(self.slip), most), self.slip * self.strength) / self.dt
+        """What its images give: against the drag at the whole speed, and no stronger than along it."""
+        speed = (self.slip if self.strength > 0 else -self.slip) / self.dt
         return [((end[0] - start[0]) * speed, (end[1] - start[1]) * speed) for start, end, _ in self.tip.paths]
 
     @property

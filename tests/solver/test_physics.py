@@ -9,7 +9,7 @@ import pytest
 from scipy import fft, ndimage
 
 from solver.brush.brush import Brush, Tip
-from solver.brush.push import FIRM_CARRIED, LOOSEST_CARRIED, Push, Slip, gain_compensation, slip_factor
+from solver.brush.push import FIRM_CARRIED, LOOSEST_CARRIED, Push, Slip, gain_compensation, quick_slip, slip_factor
 from solver.fluid import Fluid
 from solver.gl.device import Device
 from solver.grid import Grid
@@ -255,14 +255,10 @@ def test_what_a_brush_has_drawn_acts_in_one_step(device: Device) -> None:
         thing.release()
 
 
-@pytest.mark.parametrize(
-    ("far", "slip", "moved"), [(0.05, 1.0, 0.05), (0.3, 1.0, 0.1), (0.3, 0.5, 0.1), (0.15, 0.5, 0.075)]
-)
-def test_a_push_carries_by_no_more_than_its_radius_in_a_step(far: float, slip: float, moved: float) -> None:
-    for strength, sign in ((1.0, 1), (-0.5, -1)):
-        push = Push(Tip((0.2, 0.3), (0.2 + 0.6 * far, 0.3 - 0.8 * far), 0.1), 1 / 60, strength, slip)
-        assert push.velocities == [pytest.approx((sign * 60 * 0.6 * moved, sign * -60 * 0.8 * moved))]
-    assert Push(Tip((0.2, 0.3), (0.2, 0.3), 0.1), 1 / 60).velocities == [(0.0, 0.0)]
+@pytest.mark.parametrize(("far", "part"), [(0.05, 2.0), (0.1, 1.0), (0.3, 1 / 3)])
+def test_a_push_carries_by_no_more_than_its_radius_in_a_step(far: float, part: float) -> None:
+    assert quick_slip(Tip((0.2, 0.3), (0.2 + 0.6 * far, 0.3 - 0.8 * far), 0.1)) == pytest.approx(part)
+    assert quick_slip(Tip((0.2, 0.3), (0.2, 0.3), 0.1)) > 1
 
 
 @pytest.mark.parametrize("radii", [0.3, 1.0, 3.0])
