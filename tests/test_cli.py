@@ -607,8 +607,9 @@ def test_interrupted_before_it_does_anything_it_says_so(folder: Path, moment: st
     if moment == "before a job has begun":
         begin = f"import app.cli\ndef wait(**_): {waiting}\napp.cli.cli = wait\n{begin}"
     path = os.pathsep.join([str(folder), str(ROOT)] if moment == "while modules are loaded" else [str(ROOT)])
+    heard = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"  # behind `&` it would be ignored
     started = subprocess.Popen(
-        [sys.executable, "-c", begin],
+        [sys.executable, "-c", f"{heard}\n{begin}"],
         cwd=folder if moment == "while modules are loaded" else ROOT,
         env=os.environ | {"PYTHONPATH": path},
         stdout=subprocess.PIPE,
