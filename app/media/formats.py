@@ -9,6 +9,9 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from app.errors import UserError
 from app.media.codecs import avif, exr, jpeg, other, pillow, png, tiff, webp
@@ -53,13 +56,15 @@ ONLY_READ = {
     "DDS": (".dds",), "ICO": (".ico",), "JPEG 2000": (".j2k", ".jp2"), "PBM": (".pbm",), "PCX": (".pcx",),
     "PGM": (".pgm",), "PNM": (".pnm",), "PPM": (".ppm",), "QOI": (".qoi",), "SGI": (".sgi",), "TGA": (".tga",),
 }  # fmt: skip
+# XYZ of red, green and blue as profiles have them, for a white of D50 (IEC 61966-2-1, ICC.1).
+SRGB_PRIMARIES = ((0.4361, 0.2225, 0.0139), (0.3851, 0.7169, 0.0971), (0.1431, 0.0606, 0.7141))
 EMBEDDED = frozenset({"icc", "exif", "xmp"})
 HEADER = frozenset({"chromaticities", "texts", "attributes"})
 TABLE = (
     Format(
         "PNG", (".png",), png.read, png.write, rb"\x89PNG\r\n\x1a\n",
         bits=(8, 16), longest=1_000_000, held_dpi=png.held_dpi, keeps=EMBEDDED | {"dpi", "texts", "chunks"},
-        but={"texts": png.unheld_texts},
+        but={"texts": png.unheld_texts, "xmp": png.unheld_xmp},
     ),
     Format(
         "JPEG", (".jpg", ".jpeg"), jpeg.read, jpeg.write, rb"\xff\xd8\xff",
@@ -147,6 +152,17 @@ def profile_name(icc: bytes) -> str:
         return ImageCms.getProfileDescription(ImageCms.ImageCmsProfile(io.BytesIO(icc))).strip() or "unnamed"
     except (ImageCms.PyCMSError, OSError):
         return ""
+
+
+def is_srgb(icc: bytes) -> bool:
+    """Whether an ICC profile is that of sRGB, by its name and its primaries."""
+    from PIL import ImageCms
+
+    if "sRGB" not in profile_name(icc) or icc[16:20] != b"RGB ":
+        return False
+    told: Any = ImageCms.ImageCmsProfile(io.BytesIO(icc)).profile
+    primaries = [told.red_colorant, told.green_colorant, told.blue_colorant]
+    return all(one and np.allclose(one[0], xyz, atol=2e-3) for one, xyz in zip(primaries, SRGB_PRIMARIES, strict=True))
 
 
 def fits_profile(picture: Picture, kind: Format) -> bool:

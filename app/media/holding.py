@@ -18,7 +18,7 @@ from app.media.codecs.metadata import tag_names
 from app.media.depth import as_half, to_bits
 from app.media.encoders import ANIMATIONS, Stream, check_colours_of_picture, depth_of, has_alpha
 from app.media.files import is_sequence
-from app.media.formats import Format, fits_profile, picture_format, profile_name, written_depth
+from app.media.formats import Format, fits_profile, is_srgb, picture_format, profile_name, written_depth
 from app.media.losses import REC709, counted, few
 from app.model.picture import Picture, srgb_to_linear, unpremultiplied
 
@@ -206,6 +206,9 @@ def _above(picture: Picture, room: Room) -> str:
     if picture.linear and room.is_float and room.bits == 16:
         beyond = ((np.isfinite(strip) & (np.abs(strip) >= LARGEST_HALF)).any() for strip in _strips(picture))
         return "beyond 65504" if any(beyond) else ""
+    if picture.premultiplied and not picture.linear and room.has_alpha and not _stays_multiplied(picture, room):
+        brighter = ((strip[..., :-1] > strip[..., -1:]) & (strip[..., -1:] > 0) for strip in _strips(picture))
+        return "above 1" if any(map(np.any, brighter)) else ""
     if not _is_cut(picture, room):
         return ""
     largest = 1 + 0.5 / _most(room)
@@ -247,8 +250,7 @@ def _unseen(picture: Picture, room: Room) -> str:
     """Colours where alpha is 0: light without a body where they are multiplied, else what may be uncovered again."""
     if not picture.has_alpha or not (room.has_alpha or picture.premultiplied):
         return ""
-    stays = picture.premultiplied and "premultiplied" in room.keeps and _is_as_deep(picture, room)
-    if stays or (not picture.premultiplied and not (room.kind and room.kind.multiplied)):
+    if _stays_multiplied(picture, room) or (not picture.premultiplied and not (room.kind and room.kind.multiplied)):
         return ""
     for strip in _strips(picture):
         if (strip[..., :-1][strip[..., -1] == 0] != 0).any():
@@ -256,8 +258,10 @@ def _unseen(picture: Picture, room: Room) -> str:
     return ""
 
 
-def _is_as_deep(picture: Picture, room: Room) -> bool:
-    return picture.linear == room.is_float and (picture.linear or picture.bits == room.bits)
+def _stays_multiplied(picture: Picture, room: Room) -> bool:
+    """Whether colours that are multiplied by alpha are written as they are."""
+    is_as_deep = picture.linear == room.is_float and (picture.linear or picture.bits == room.bits)
+    return picture.premultiplied and "premultiplied" in room.keeps and is_as_deep
 
 
 # Of what belongs to them --------------------------------------------------------------------------------------------
@@ -276,13 +280,13 @@ def _icc(picture: Picture, room: Room) -> str:
     name = few([profile_name(picture.icc) or "damaged"])
     if "icc" in room.keeps:
         return f"lacks the picture's colour profile ({name}), which is not for its colours"
-    return "" if "sRGB" in name else f"cannot hold the picture's colour profile ({name}), and is read as sRGB"
+    return "" if is_srgb(picture.icc) else f"cannot hold the picture's colour profile ({name}), and is read as sRGB"
 
 
 def _chunks(picture: Picture, room: Room) -> str:
     if "chunks" in room.keeps or (room.kind is None and b"cICP" in picture.chunks):
         return ""  # a video that cannot tell it is refused: `check_colours_of_picture`
-    told = png.unusual(picture.chunks, picture.icc is not None)
+    told = png.unusual(picture.chunks, picture.icc is not None) + png.light(picture.chunks)
     return f"cannot tell the picture's {' and '.join(told)}" if told else ""
 
 

@@ -33,6 +33,8 @@ MAP_ENDINGS = (".exr", ".tif", ".tiff", ".flo", ".npy")
 # Names of the channels of an EXR that hold a map, whatever layer they are in.
 PAIRS = (("R", "G"), ("U", "V"), ("u", "v"), ("X", "Y"))
 
+LARGEST = 1e30  # of what is no infinite value: in pixels it is still one of 32 bits
+
 HEAD = 65_536  # bytes at the start of a file in which an EXR or TIFF map says what it is
 
 CONVENTIONS = {
@@ -210,7 +212,7 @@ def read_map(
 
 def _known(path: str | os.PathLike[str], values: np.ndarray) -> np.ndarray:
     """The values, both NaN where one is; raises `UserError` for infinite ones, or if none is left."""
-    bad = np.isinf(values).any(axis=2)
+    bad = (np.abs(values) > LARGEST).any(axis=2)
     if bad.any():
         row, column = np.argwhere(bad)[0]
         raise UserError(
@@ -259,7 +261,8 @@ def _read_npy(file: Path, max_pixels: int) -> np.ndarray:
         if os.fstat(stream.fileno()).st_size < stream.tell() + math.prod(shape) * kind.itemsize:
             raise UserError(f"Cannot read {file}: it is truncated; get it again.")
         stream.seek(0)
-        return _in_memory(file, lambda: np.load(stream, allow_pickle=False))
+        values = _in_memory(file, lambda: np.load(stream, allow_pickle=False))
+        return np.ascontiguousarray(values)  # also one of Fortran's order
 
 
 def _in_memory(file: Path, read: Callable[[], np.ndarray]) -> np.ndarray:

@@ -20,6 +20,7 @@ LONGEST_WORD = 200  # characters of a number, or of a key without quotes
 LONGEST_STRING = 10_000
 MOST_WORDS = 200_000  # keys, values and brackets, but for those of lists of numbers; a stroke has about 20
 MOST_NUMBERS = 2_000_000  # in lists of them; of an hour's painting there are 432,000, four to a tick
+MOST_LINES = 500_000  # of which each costs a parser as much as a word, if there is nothing on it
 LONG = 200  # characters of lists of numbers that are worth being read by json
 _MARK = "\ue000"  # begins what stands where they were, a character that nobody writes
 _MARKED = re.compile(rf"{_MARK}|\\[uU]0*+[eE]000")
@@ -101,6 +102,8 @@ def _check(text: str, source: str) -> list[tuple[int, int]]:
         line = text.count("\n", 0, at) + 1
         return UserError(f"{source}, line {line}: {what}, which is more than any recipe needs; get it again")
 
+    if text.count("\n") > MOST_LINES:
+        raise UserError(f"{source} has more than {MOST_LINES} lines, more than any recipe needs; get it again")
     rows: list[tuple[int, int]] = []
     depth = dots = words = numbers = 0
     before = ""  # the last mark, if nothing came after it

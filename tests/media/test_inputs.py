@@ -292,6 +292,14 @@ def test_samples_are_no_words() -> None:
     assert len(toml.parsed(f"samples = [{samples * pairs}]", "a.toml")["samples"]) == 2 * pairs
 
 
+def test_lines_of_nothing_are_counted() -> None:
+    assert toml.parsed("\n" * toml.MOST_LINES, "a.toml") == {}
+    with pytest.raises(
+        UserError, match=r"^a\.toml has more than 500000 lines, more than any recipe needs; get it again"
+    ):
+        toml.parsed("\n" * (toml.MOST_LINES + 1), "a.toml")
+
+
 ROWS = {
     "samples": "a = [{row}]",
     "with others": "a = [ [1, 2], 'b', {row}, {{c = [{row}, []]}}, [[{row}]] ]  # [[{row}]]",

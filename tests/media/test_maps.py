@@ -242,6 +242,19 @@ def test_infinite_places_are_refused(tmp_path: Path, ending: str):
 
 
 @pytest.mark.parametrize("ending", [".exr", ".tif", ".flo", ".npy"])
+def test_an_array_of_fortrans_order_is_a_map_as_any(tmp_path: Path) -> None:
+    values = np.random.default_rng(0).random((5, 7, 2), np.float32) / 8
+    np.save(tmp_path / "a.npy", np.asfortranarray(values))
+    write_map(tmp_path / "b.flo", read_map(tmp_path / "a.npy"))
+    np.testing.assert_allclose(read_map(tmp_path / "b.flo").values, values, atol=1e-6)
+
+
+def test_values_that_are_infinite_in_32_bits_are_refused(tmp_path: Path) -> None:
+    np.save(tmp_path / "a.npy", np.full((5, 7, 2), 1e300))
+    with pytest.raises(UserError, match=r"35 of its pixels are infinite, the first at x 0, y 0"):
+        read_map(tmp_path / "a.npy")
+
+
 def test_nan_is_kept(tmp_path: Path, ending: str):
     map_ = swirl(8, 9)
     map_.values[3, 5] = np.nan

@@ -340,7 +340,7 @@ def test_odd_tiffs(tmp_path: Path):
     np.testing.assert_array_equal(read_picture(path).pixels, whole // 65536)
     for unsupported in (np.zeros((4, 4), np.complex64), np.zeros((4, 4), np.int16)):
         tifffile.imwrite(path, unsupported)
-        with pytest.raises(UserError, match="convert it to 16 bits"):
+        with pytest.raises(UserError, match="convert to uint16 or float32"):
             read_picture(path)
 
 
@@ -461,6 +461,98 @@ def test_every_chunk_of_a_png_is_kept_or_told(tmp_path: Path):
     assert with_chunks(path, pHYs=struct.pack(">IIB", 1, 1, 0)) == ""
 
 
+def test_what_of_a_png_is_damaged_or_left_behind_is_told(tmp_path: Path):
+    path, profile = tmp_path / "a.png", ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
+    packed = zlib.compress(profile)
+    assert with_chunks(path, iCCP=b"p\0\0" + packed) == ""
+    for cut in (5, 90):
+        said = with_chunks(path, iCCP=b"p\0\0" + packed[:cut])
+        assert said == "a.png: its colour profile is damaged and not kept whole"
+    text, word = b"Title\0\0", zlib.compress(b"a word")
+    assert with_chunks(path, zTXt=text + word) == with_chunks(path, zTXt=text + zlib.compress(b"")) == ""
+    assert with_chunks(path, tEXt=b"Title\0") == with_chunks(path, iTXt=text + b"\0\0\0") == ""
+    assert with_chunks(path, zTXt=text + b"bad") == "a.png: its damaged text Title is not kept"
+    assert with_chunks(path, tEXt=b"\0b") == "a.png: its damaged text without a name is not kept"
+    said = with_chunks(path, iTXt=b"Title\0\0\0fr\0Titre\0Un titre")
+    assert said == "a.png: the language of its text Title is not kept"
+    assert with_chunks(path, iTXt=b"XML:com.adobe.xmp\0\0\0\0\0<x/>") == with_chunks(path, sBIT=bytes([8, 8, 8])) == ""
+    path.write_bytes(path.read_bytes() + bytes(7))
+    assert read_picture(path).note == "a.png: the 7 bytes after its end are not kept"
+    once = with_chunks(path, iCCP=b"p\0\0" + packed)
+    data, chunk = path.read_bytes(), path.read_bytes()[33 : 33 + 12 + 3 + len(packed)]
+    path.write_bytes(data[:33] + chunk + data[33:])
+    assert (once, read_picture(path).note) == ("", "a.png: of its 2 colour profiles only the last is kept")
+
+
+def test_what_of_light_and_range_another_kind_cannot_tell_is_told(tmp_path: Path):
+    path = tmp_path / "a.png"
+    assert with_chunks(path, mDCV=bytes(24), cLLI=bytes(8)) == ""
+    picture, light = read_picture(path), "mastering display (mDCV) and light levels (cLLI)"
+    assert unheld("o.png", picture) == ""
+    assert unheld("o.tif", picture) == f"o.tif cannot tell the picture's {light}; write .png to keep it"
+    narrow = "a.png: its colours are mixed as if sRGB, in spite of its narrow range (cICP)"
+    assert with_chunks(path, cICP=bytes([1, 13, 0, 0])) == narrow
+    assert "cannot tell the picture's narrow range (cICP)" in unheld("o.tif", read_picture(path))
+
+
+def test_xmp_that_is_no_utf_8_is_told_where_it_has_to_be(tmp_path: Path):
+    picture = replace(Picture(np.zeros((2, 3, 3), np.uint8)), xmp=b"<x>\xff</x>")
+    assert unheld("o.png", picture) == "o.png lacks the picture's XMP; write .tif to keep it"
+    write_picture(tmp_path / "o.png", picture, strip=False)
+    assert read_picture(tmp_path / "o.png").xmp is None
+
+
+def test_a_profile_is_that_of_srgb_by_its_primaries_too() -> None:
+    profile = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
+    count = int.from_bytes(profile[128:132], "big")
+    tags = {
+        profile[at : at + 4]: int.from_bytes(profile[at + 4 : at + 8], "big") for at in range(132, 132 + 12 * count, 12)
+    }
+    at = tags[b"rXYZ"] + 8  # X, in 65,536 parts
+    wide = profile[:at] + struct.pack(">i", 39322) + profile[at + 4 :]
+    pixels = np.zeros((2, 3, 3), np.uint8)
+    assert unheld("o.exr", replace(Picture(pixels), icc=profile)) == ""
+    said = unheld("o.exr", replace(Picture(pixels), icc=wide))
+    assert "cannot hold the picture's colour profile (sRGB built-in), and is read as sRGB; write .png" in said
+
+
+def test_colours_above_their_alpha_are_told_where_they_are_divided_by_it() -> None:
+    pixels = np.full((2, 3, 4), 90, np.uint8)
+    for alpha, told in ((90, ""), (89, "o.png cuts values above 1; write .tif to keep it")):
+        pixels[0, 0, 3] = alpha
+        picture = replace(Picture(pixels.copy()), premultiplied=True)
+        assert (unheld("o.png", picture), unheld("o.tif", picture)) == (told, "")
+
+
+def test_what_of_a_tiff_is_beside_its_first_page_or_cut_is_told(tmp_path: Path):
+    path, pixels = tmp_path / "a.tif", smooth(3)
+    rng = np.random.default_rng(0)
+    seen = pixels[..., 0] > 9
+    for kind, page, colours, said in (
+        (1, pixels[::2], "rgb", "its smaller versions are not kept"),
+        (4, seen, "mask", "its mask is not kept"),
+    ):
+        with tifffile.TiffWriter(path) as writer:
+            writer.write(pixels, photometric="rgb")
+            writer.write(page, photometric=colours, subfiletype=kind)
+        assert read_picture(path).note == f"a.tif: {said}"
+    with tifffile.TiffWriter(path) as writer:
+        writer.write(pixels, photometric="rgb", subifds=1)
+        writer.write(pixels[::2, ::2], photometric="rgb", subfiletype=1)
+    assert read_picture(path).note == "a.tif: its smaller versions are not kept"
+    for samples, said in (
+        (rng.random((4, 5, 3)), "a.tif: its 64 bits become 32"),
+        (rng.random((4, 5, 3)).astype(np.float32).astype(float), ""),
+        (rng.integers(0, 2**32, (4, 5, 3), np.uint32), "a.tif: its 32 bits become 16"),
+        (rng.integers(0, 2**16, (4, 5, 3), np.uint32) * 65537, ""),
+    ):
+        tifffile.imwrite(path, samples, photometric="rgb")
+        assert read_picture(path).note == said
+    tifffile.imwrite(path, pixels, photometric="ycbcr", subsampling=(1, 1))
+    with pytest.raises(UserError, match=r"a TIFF in YCbCr is not supported but as JPEG; convert it to RGB\.$"):
+        read_picture(path)
+
+
 @pytest.mark.parametrize("bits", [1, 2, 4, 8])
 def test_the_key_of_a_grey_png_is_in_its_own_bits(tmp_path: Path, bits: int):
     codes = np.random.default_rng(bits).integers(0, 2**bits, (4, 8), np.uint8)
@@ -541,7 +633,7 @@ def test_what_of_a_tiff_is_lost_is_told(tmp_path: Path):
     path = tmp_path / "a.tif"
     for pixels, said in {
         "uint32": (noise(1, np.uint16)[..., 0].astype(np.uint32), "its 32 bits become 16"),
-        "float64": (noise(1, np.float32)[..., 0].astype(np.float64), "its 64 bits become 32"),
+        "float64": (noise(1, np.float32)[..., 0] / np.float64(3), "its 64 bits become 32"),
         "float16": (noise(1, np.float32)[..., 0].astype(np.float16), ""),
     }.values():
         tifffile.imwrite(path, pixels)
@@ -555,7 +647,7 @@ def test_what_of_a_tiff_is_lost_is_told(tmp_path: Path):
     with tifffile.TiffWriter(path) as writer:  # a smaller version of the same picture is no page of its own
         writer.write(smooth(3), photometric="rgb")
         writer.write(smooth(3)[::2, ::2], photometric="rgb", subfiletype=1)
-    assert read_picture(path).note == ""
+    assert read_picture(path).note == "a.tif: its smaller versions are not kept"
 
 
 def test_every_tag_of_a_tiff_is_kept_or_told(tmp_path: Path):

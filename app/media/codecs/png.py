@@ -6,21 +6,27 @@ import io
 import struct
 from collections import Counter
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from app.media.codecs import ZLIB_LEVEL, pillow
 from app.media.codecs.decoding import quiet
 from app.media.codecs.metadata import sized_exif
-from app.media.losses import REC709, few, not_kept, unusual_colours
+from app.media.losses import REC709, counted, few, not_kept, unusual_colours
 from app.model.picture import Picture
 
 UNKEPT_CHUNKS = {b"bKGD": "background colour", b"sBIT": "number of significant bits"}
+LIGHT_CHUNKS = {b"mDCV": "mastering display (mDCV)", b"cLLI": "light levels (cLLI)"}  # which say nothing of the values
 COLOUR_CHUNKS = {b"cICP": 4, b"gAMA": 4, b"cHRM": 32, b"sRGB": 1, b"mDCV": 24, b"cLLI": 8}  # and their lengths
 TEXT_CHUNKS = (b"tEXt", b"zTXt", b"iTXt")
 LONGEST_KEYWORD = 79
+XMP_NAME = "XML:com.adobe.xmp"
+EMPTY = {b"tEXt": range(2), b"zTXt": range(10, 11), b"iTXt": range(5, 14)}  # bytes after the name of a text of nothing
+MOST_HEADER = 300  # bytes that a text's name, compression and language are looked for in
 # What is kept otherwise, is made anew (tIME, iDOT, hIST), or is of frames that are told themselves.
 UNDERSTOOD = {
     b"IHDR", b"PLTE", b"IDAT", b"tRNS", b"iCCP", b"pHYs", b"eXIf", b"tIME", b"acTL", b"fcTL", b"fdAT", b"iDOT", b"hIST",
@@ -32,7 +38,7 @@ USUAL_GAMMA = range(45000, 46000)  # 1 / 2.2, as sRGB has it on the whole
 def read(file: Path, max_pixels: int) -> Picture:
     """Read a PNG in its depth."""
     with pillow.opened("PNG", file, max_pixels) as image:
-        chunks, unkept = _chunks(file)
+        chunks, unkept = _chunks(file, image)
         colours = unusual(chunks, image.info.get("icc_profile") is not None)
         losses = [f"its colours are mixed as if sRGB, in spite of its {' and '.join(colours)}"] if colours else []
         losses += unkept
@@ -54,31 +60,61 @@ def _bits(file: Path) -> int:
         return stream.read(25)[24]
 
 
-def _chunks(file: Path) -> tuple[dict[bytes, bytes], list[str]]:
-    """The chunks of a PNG that say what its colours mean, and in words what of the others is not kept."""
+def _chunks(file: Path, image: Any) -> tuple[dict[bytes, bytes], list[str]]:
+    """The chunks of a PNG that say what its colours mean, and in words what of the others is not kept of `image`."""
     found: dict[bytes, bytes] = {}
     unkept: dict[str, None] = {}
     unknown: dict[str, None] = {}
-    texts: list[str] = []
+    texts, damaged, translated, profiles = list[str](), list[str](), list[str](), 0
     with file.open("rb") as stream:
         stream.seek(8)
         while len(head := stream.read(8)) == 8 and (kind := head[4:]) != b"IEND":
             length = int.from_bytes(head[:4], "big")
             end = stream.tell() + length + 4
-            if kind in UNKEPT_CHUNKS:
+            profiles += kind == b"iCCP"
+            if kind in UNKEPT_CHUNKS and not (kind == b"sBIT" and _are_all(stream.read(length), image, file)):
                 unkept[UNKEPT_CHUNKS[kind]] = None
             if COLOUR_CHUNKS.get(kind) == length:
                 found[kind] = stream.read(length)
             elif kind in TEXT_CHUNKS:
-                texts.append(stream.read(min(length, 80)).partition(b"\0")[0].decode("latin-1"))
+                key, _, rest = stream.read(min(length, MOST_HEADER)).partition(b"\0")
+                texts.append(key.decode("latin-1"))
+                if not _is_read(kind, texts[-1], length - len(key), image):
+                    damaged.append(texts[-1] or "without a name")
+                if kind == b"iTXt" and rest[2:4] != b"\0\0":  # how it is compressed, its language, its name in that
+                    translated.append(texts[-1])
             elif kind not in UNKEPT_CHUNKS and kind not in UNDERSTOOD:
                 unknown[kind.decode("latin-1")] = None
             stream.seek(end)
+        rest = file.stat().st_size - (stream.tell() + 4)  # the end has no contents, and a sum of four bytes
     losses = [f"what it says of its {', '.join(unkept)} is not kept"] if unkept else []
     losses += [not_kept("chunk", list(unknown))] if unknown else []
+    profile = image.info.get("icc_profile") or b""
+    if profiles and len(profile) < int.from_bytes(profile[:4] or b"\1", "big"):  # as it says itself (ICC.1, 7.2.2)
+        losses.append("its colour profile is damaged and not kept whole")
+    elif profiles > 1:
+        losses.append(f"of its {profiles} colour profiles only the last is kept")
     if repeated := [text for text, count in Counter(texts).items() if count > 1]:
         losses.append(f"of several texts under one name only the last is kept: {few(repeated)}")
+    if damaged:
+        losses.append(not_kept("damaged text", damaged))
+    if translated:
+        losses.append(f"the language of its {counted('text', translated)} is not kept")
+    if rest > 0:
+        losses.append(f"the {rest} bytes after its end are not kept")
     return found, losses
+
+
+def _is_read(kind: bytes, text: str, length: int, image: Any) -> bool:
+    """Whether Pillow has read a text of a PNG, which has so many bytes after its name."""
+    if text == XMP_NAME:
+        return bool(image.info.get("xmp"))
+    return bool(text) and (bool(image.text.get(text)) or (text in image.text and length in EMPTY[kind]))
+
+
+def _are_all(significant: bytes, image: Any, file: Path) -> bool:
+    """Whether sBIT names as many bits as there are."""
+    return min(significant, default=0) >= (8 if image.mode == "P" else _bits(file))
 
 
 def coded(primaries: int, transfer: int) -> dict[bytes, bytes]:
@@ -89,8 +125,8 @@ def coded(primaries: int, transfer: int) -> dict[bytes, bytes]:
 def unusual(chunks: Mapping[bytes, bytes], has_profile: bool) -> list[str]:
     """What a PNG's chunks tell of its colours, and we do not understand, in words."""
     if codes := chunks.get(b"cICP"):
-        colours = unusual_colours(codes[0], codes[1])
-        return [f"{colours} (cICP)"] if colours else []
+        told = [unusual_colours(codes[0], codes[1]), "" if codes[3] else "narrow range"]
+        return [f"{' '.join(filter(None, told))} (cICP)"] if any(told) else []
     if has_profile or b"sRGB" in chunks:
         return []
     found = []
@@ -101,6 +137,19 @@ def unusual(chunks: Mapping[bytes, bytes], has_profile: bool) -> list[str]:
         if not np.allclose(np.roll(x_y, -2), REC709, atol=2e-3):
             found.append("primaries (cHRM)")
     return found
+
+
+def light(chunks: Mapping[bytes, bytes]) -> list[str]:
+    """What a PNG's chunks tell of how bright its light was meant to be shown, in words."""
+    return [words for kind, words in LIGHT_CHUNKS.items() if kind in chunks]
+
+
+def unheld_xmp(picture: Picture) -> list[str]:
+    """XMP that is no UTF-8, as a PNG's has to be (11.3.3.4)."""
+    with suppress(UnicodeDecodeError):
+        (picture.xmp or b"").decode()
+        return []
+    return ["XMP"]
 
 
 def unheld_texts(picture: Picture) -> list[str]:
@@ -136,8 +185,8 @@ def write(path: Path, picture: Picture, quality: int) -> None:
         extra.add(b"pHYs", struct.pack(">IIB", *_dots_a_metre(picture.dpi), 1))
     if picture.exif:
         extra.add(b"eXIf", sized_exif(picture).removeprefix(b"Exif\0\0"))
-    if picture.xmp:
-        extra.add_itxt("XML:com.adobe.xmp", picture.xmp.decode("utf-8", "replace"))
+    if picture.xmp and not unheld_xmp(picture):
+        extra.add_itxt(XMP_NAME, picture.xmp.decode())
     for key, text in picture.texts.items():
         extra.add_itxt(_keyword(key), text)
     chunks = io.BytesIO()

@@ -42,7 +42,9 @@ TEXTS = (0x010D, DESCRIPTION, 0x010F, 0x0110, 0x011D, 0x0131, 0x0132, 0x013B, 0x
 UNDERSTOOD = {
     *range(254, 267), 273, 274, *range(277, 285), *range(288, 294), 296, 297, 317, *range(320, 326), 330,
     *range(332, 335), *range(336, 348), *range(512, 522), *range(529, 533), 559, 700, 34675, EXIF_IFD, GPS_IFD, *TEXTS,
+    50674,
 }  # fmt: skip
+DECODED = {6, 7, 33007, 34892}  # ways of JPEG, of which tifffile makes RGB
 COLOURS = {"MINISBLACK": 1, "MINISWHITE": 1, "PALETTE": 1, "SEPARATED": 4}
 # Descriptions in which tifffile, ImageJ and OME keep the shape, which readers believe and a result would belie.
 LAYOUT = re.compile(r'\s*\{"shape": ?\[|ImageJ=|.{0,400}<OME[\s>]', re.DOTALL)
@@ -82,11 +84,14 @@ def read(file: Path, max_pixels: int, place: int | None = None) -> Picture:
         pieces = math.prod(page.chunked)
         if not page.is_contiguous and len(page.dataoffsets) < pieces:  # tifffile fills what is missing with zeros
             raise ValueError(f"it has {len(page.dataoffsets)} of its {pieces} strips or tiles")
+        photometric = tifffile.PHOTOMETRIC(page.photometric).name
+        if photometric == "YCBCR" and int(page.compression) not in DECODED:
+            raise UserError(f"Cannot read {file}: a TIFF in YCbCr is not supported but as JPEG; convert it to RGB.")
         losses = _losses(tiff) if place is None else []
         if unkept := [tag.name for tag in page.tags if tag.code not in UNDERSTOOD]:
             losses.append(not_kept("tag", unkept))
         pixels = page.asarray()
-        photometric = tifffile.PHOTOMETRIC(page.photometric).name
+        losses += _cut(pixels, page.bitspersample)
         place_of_tags, layout = page.offset, (tiff.byteorder, tiff.is_bigtiff)
     is_half = pixels.dtype == np.float16
     pixels = np.moveaxis(pixels, 0, -1) if page.axes == "SYX" else pixels.reshape(*pixels.shape[:2], -1)
@@ -156,15 +161,30 @@ def _palette(table: Any) -> np.ndarray:
 
 
 def _losses(tiff: Any) -> list[str]:
-    """What of a TIFF is not in its first page, and what is cut of its samples."""
+    """What of a TIFF is not in its first page."""
     losses = []
     with suppress(Exception):  # pages after the first may be damaged
-        pages = sum(not page.subfiletype & 5 for page in _pages(tiff))  # neither smaller versions nor masks
-        if pages > 1:
+        kinds = [page.subfiletype & 5 for page in _pages(tiff)]  # 1: smaller versions, 4: masks
+        if (pages := kinds.count(0)) > 1:
             losses.append(f"of its {pages} pages only the first is used")
-    if (kind := tiff.pages.first.dtype) is not None and kind.itemsize > (2 if kind.kind == "u" else 4):
-        losses.append(f"its {8 * kind.itemsize} bits become {16 if kind.kind == 'u' else 32}")
+        if any(kind & 4 for kind in kinds):
+            losses.append("its mask is not kept")
+        if any(kind & 1 for kind in kinds) or tiff.pages.first.subifds:
+            losses.append("its smaller versions are not kept")
     return losses
+
+
+def _cut(pixels: np.ndarray, bits: int) -> list[str]:
+    """Whether samples of so many bits lose something on being made what a picture has."""
+    kind, size = pixels.dtype.kind, pixels.dtype.itemsize
+    if kind == "u" and size == 4:
+        top = pixels >> 16
+        return [] if np.array_equal(top * 65537, pixels) else [f"its {bits} bits become 16"]
+    if kind == "f" and size == 8:
+        with np.errstate(over="ignore"):
+            same = np.array_equal(pixels.astype(np.float32), pixels, equal_nan=True)
+        return [] if same else ["its 64 bits become 32"]
+    return []
 
 
 def plain_depth(file: Path, pixels: np.ndarray) -> np.ndarray:
@@ -178,7 +198,7 @@ def plain_depth(file: Path, pixels: np.ndarray) -> np.ndarray:
         return (pixels >> 16).astype(np.uint16)
     if kind == "u" and pixels.dtype.itemsize <= 2:
         return pixels.astype(pixels.dtype.newbyteorder("="))
-    raise UserError(f"Cannot read {file}: samples of {pixels.dtype} are not supported; convert it to 16 bits.")
+    raise UserError(f"Cannot read {file}: samples of {pixels.dtype} are not supported; convert to uint16 or float32.")
 
 
 def unheld_exif(picture: Picture) -> list[str]:
