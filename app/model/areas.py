@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from app.model.sampling import SOURCE, NamedPictures, Point, Segment, Window, places
 from app.model.schema import Model, Several
@@ -14,6 +14,8 @@ from solver.grid import Grid
 
 Seen = Callable[[np.ndarray, Grid], np.ndarray]
 """Values of the picture as it was, on a grid's cells, taken to where they are seen at a moment."""
+
+MOST_CORNERS = 50_000  # of an outline: each takes 20 microseconds
 
 
 def as_it_was(values: np.ndarray, grid: Grid) -> np.ndarray:
@@ -35,6 +37,12 @@ class Area(Model):
     outline: Annotated[Several[Point], Field(min_length=3)] | None = None
     segment: Segment | None = None
     invert: bool = False
+
+    @model_validator(mode="after")
+    def _affordable(self) -> Self:
+        if self.outline is not None and len(self.outline) > MOST_CORNERS:
+            raise ValueError(f"its outline has {len(self.outline)} corners; at most {MOST_CORNERS} work")
+        return self
 
     def coverage(self, grid: Grid, pictures: NamedPictures, seen: Seen = as_it_was) -> np.ndarray:
         """How much of each cell lies in the area, (ny, nx) in [0, 1].

@@ -41,6 +41,7 @@ from app.model.schema import Fraction01, Model, Radius, Several, label_of
 from solver.grid import Grid
 
 MOST_VISCOUS = 1e6
+MOST_POINTS = 20_000  # of a layer's path: each takes 35 microseconds and more
 FINE = 1024  # cells along the longer side, at least, that a picture is quantised on
 Viscosity = Annotated[float, Field(ge=0, le=MOST_VISCOUS)]
 
@@ -138,6 +139,12 @@ class _Path(_Layer):
     points: Annotated[Several[Point], Field(min_length=1)]
     radius: Radius = 0.08
     hardness: Fraction01 = 0.5
+
+    @model_validator(mode="after")
+    def _affordable(self) -> Self:
+        if len(self.points) > MOST_POINTS:
+            raise ValueError(f"its path has {len(self.points)} points; at most {MOST_POINTS} work")
+        return self
 
     def intensity(self, grid: Grid, pictures: NamedPictures) -> np.ndarray:
         return falloff(distance_to_path(places(self.points, grid), grid, self.radius) / self.radius, self.hardness)

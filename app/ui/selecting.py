@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from app.errors import UserError
-from app.model.areas import Area, Part, inverted
+from app.model.areas import MOST_CORNERS, Area, Part, inverted
 from app.model.mask_edits import FillMask
 from app.model.sampling import SOURCE, Point, Segment, Window, channels, intensity, pixel_at, to_grid
 from app.ui.editor_state import SELECT_BY, EditorState
@@ -58,7 +58,9 @@ class Selecting:
     def move(self, x: float, y: float) -> None:
         """The pointer moved."""
         place = _within(x, y)
-        if self.path and max(abs(a - b) for a, b in zip(place, self.path[-1], strict=True)) > NEAR:
+        if not 0 < len(self.path) < MOST_CORNERS:
+            return
+        if max(abs(a - b) for a, b in zip(place, self.path[-1], strict=True)) > NEAR:
             self.path.append(place)
 
     def release(self) -> None:

@@ -32,6 +32,7 @@ from app.media.source import open_source
 from app.media.video import read_clip
 from app.model import toml
 from app.model.picture import Picture
+from app.model.recipe import Recipe
 from app.model.schema import frozen
 from app.ui.preferences import Preferences
 from support.commands import Run
@@ -298,6 +299,23 @@ def test_lines_of_nothing_are_counted() -> None:
         UserError, match=r"^a\.toml has more than 500000 lines, more than any recipe needs; get it again"
     ):
         toml.parsed("\n" * (toml.MOST_LINES + 1), "a.toml")
+
+
+@pytest.mark.parametrize(
+    ("table", "key", "most", "said"),
+    [
+        ("[[freeze]]\nkind = 'path'", "points", 20_000, "path has 20001 points"),
+        ("[[viscosity]]\nkind = 'path'\nscale = 2", "points", 20_000, "path has 20001 points"),
+        ("[[mask]]\ntick = 0\nkind = 'fill'\nof = 'frozen'\namount = 1", "outline", 50_000, "outline has 50001 corners"),
+    ],
+)
+def test_points_of_a_path_and_corners_are_counted(table: str, key: str, most: int, said: str) -> None:
+    def recipe(count: int) -> Recipe:
+        return Recipe.parse(f"version = 5\n{table}\n{key} = [{'[0.5, 0.25],' * count}]\n")
+
+    assert recipe(most).version == 5
+    with pytest.raises(UserError, match=rf"its {said}; at most {most} work"):
+        recipe(most + 1)
 
 
 ROWS = {
