@@ -7,7 +7,7 @@ import os
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
@@ -124,9 +124,20 @@ def animation_writer(
         given, sound = _sound(container, options, rate)
         if options.timecode is not None and container.sound:
             sound = [*sound, "-metadata", f"timecode={options.timecode}"]
-        encoding = container.encoding(options.codec)
+        encoding, lasting, last = container.encoding(options.codec), options.durations, np.empty(0)
+        stands = bool(container.sound and lasting and lasting[-1] > 1)
+        if stands and lasting:  # a video ends a step after its last frame, which so is given again for that step
+            options = replace(options, durations=[*lasting[:-1], lasting[-1] - 1, 1])
         with _Video(temporary, str(path), encoding, rate, container.even, options, (given, sound), cancel) as video:
-            yield lambda frame, number=None: video.write(straight(frame))
+
+            def write(frame: Frame, number: int | None = None) -> None:
+                nonlocal last
+                last = straight(frame)
+                video.write(last)
+
+            yield write
+            if stands and last.size:
+                video.write(last)
             video.finish()
         if container.name == "animated WebP" and options.durations:
             _end_webp(temporary, round(sum(options.durations) * 1000 / rate))
@@ -246,7 +257,7 @@ def _sound(container: Container, how: AnimationOptions, rate: Fraction) -> tuple
         return [], []
     begin = ["-ss", f"{start:.6f}"] if start else []
     length = [] if how.frames is None else ["-t", f"{float(how.frames / rate):.6f}"]
-    options: list[str] = []
+    options = ["-map_chapters", "-1"]  # which belong to all of it: that they are not kept is told
     for number, (place, track) in enumerate(tracks):
         # What is copied would else begin where the file can be sought to, and hold the first frame back until then.
         chosen = ("-c", "copy", "-copypriorss", "0") if track.codec in container.sound else container.encoder

@@ -267,6 +267,7 @@ def unheld_of_clip(
     if container is None or not container.sound:
         has = {"sound": clip.sound, "time code": clip.timecode}
         losses = [f"its {name} is not kept" for name, told in has.items() if told is not None]
+        losses += ["how long its frames stand is not kept"] if container is None and clip.durations else []
     else:
         other = dict.fromkeys(sound for sound in clip.sounds if sound not in (*container.sound, "none"))
         losses = [f"its sound ({' '.join(other)}) becomes {container.sound[0]}"] if other else []
@@ -277,6 +278,8 @@ def unheld_of_clip(
             losses.append(f"what its sound is spoken in ({', '.join(unknown)}) is not kept")
         if container.even and size is not None and (size[0] % 2 or size[1] % 2):
             losses.append(f"its last pixels are repeated, as {container.name} has no odd sides")
+    if clip.loops > 1 and (container is None or container.sound):
+        losses.append(f"that it is played {clip.loops} times is not kept")
     if container is None:
         return lost(clip.path, losses)
     if container.passes > 1:

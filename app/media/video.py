@@ -35,6 +35,7 @@ NAMES = {
 KEPT_PRIMARIES = ("bt2020", "smpte432", "smpte431")
 UNKEPT = {
     "subtitles": r"Stream #0.*: Subtitle: ", "chapters": r"Chapter #0", "attachments": r"Stream #0.*: Attachment: ",
+    "cover pictures": r"Stream #0.*: Video: .*attached pic",
 }  # fmt: skip
 # What every file has of its own, and the time code, which is kept.
 OWN_TAGS = {"major_brand", "minor_version", "compatible_brands", "encoder", "creation_time", "timecode"}

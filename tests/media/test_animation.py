@@ -16,6 +16,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from PIL import Image, ImageCms
@@ -804,6 +805,22 @@ def test_what_else_a_clip_holds_is_told(tmp_path: Path):
         == "a.mkv: its chapters are not kept; its attachments are not kept; its tags title, ARTIST are not kept"
     )
     assert read_clip(generate(tmp_path / "b.mkv", "testsrc=s=64x48:r=10:d=1")).note == ""
+
+
+def test_a_cover_picture_is_told_and_chapters_are_as_they_are_told(tmp_path: Path) -> None:
+    cover, told = tmp_path / "cover.png", tmp_path / "told.txt"
+    cv2.imwrite(str(cover), np.zeros((8, 8, 3), np.uint8))
+    told.write_text(";FFMETADATA1\n[CHAPTER]\nTIMEBASE=1/1\nSTART=0\nEND=1\ntitle=Morning\n")
+    sound, mapped = ("-f", "lavfi", "-i", "sine=d=1"), ("-map", "0", "-map", "1", "-map", "2")
+    further = [*sound, "-i", str(cover), "-i", str(told), *mapped, "-map_metadata", "3", "-map_chapters", "3"]
+    clip = generate(
+        tmp_path / "a.mp4", "testsrc=s=64x48:r=10:d=1", *further, "-disposition:v:1", "attached_pic", "-c:v:1", "png"
+    )
+    assert read_clip(clip).note == "a.mp4: its chapters are not kept; its cover pictures are not kept"
+    for ending in (".mp4", ".mkv", ".mov"):
+        save(tmp_path / f"b{ending}", 3, 10, sound=clip, frames=3)
+        command = ["ffprobe", "-v", "error", "-show_chapters", str(tmp_path / f"b{ending}")]
+        assert subprocess.run(command, capture_output=True, check=True).stdout == b""
 
 
 def test_what_belongs_to_a_track_is_told(tmp_path: Path):

@@ -306,7 +306,12 @@ def test_lines_of_nothing_are_counted() -> None:
     [
         ("[[freeze]]\nkind = 'path'", "points", 20_000, "path has 20001 points"),
         ("[[viscosity]]\nkind = 'path'\nscale = 2", "points", 20_000, "path has 20001 points"),
-        ("[[mask]]\ntick = 0\nkind = 'fill'\nof = 'frozen'\namount = 1", "outline", 50_000, "outline has 50001 corners"),
+        (
+            "[[mask]]\ntick = 0\nkind = 'fill'\nof = 'frozen'\namount = 1",
+            "outline",
+            50_000,
+            "outline has 50001 corners",
+        ),
     ],
 )
 def test_points_of_a_path_and_corners_are_counted(table: str, key: str, most: int, said: str) -> None:
