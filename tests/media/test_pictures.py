@@ -572,6 +572,17 @@ def test_the_key_of_a_grey_png_is_in_its_own_bits(tmp_path: Path, bits: int):
     np.testing.assert_array_equal(pixels[..., 1], np.where(codes == 1, 0, 255))
 
 
+@pytest.mark.parametrize(
+    ("options", "said"), [({"bitspersample": 12}, "of 12 bits a channel"), ({"lossless": True}, "without loss")]
+)
+def test_a_jpeg_that_no_decoder_reads_is_not_called_damaged(tmp_path: Path, options: dict[str, Any], said: str):
+    import imagecodecs
+
+    (tmp_path / "a.jpg").write_bytes(imagecodecs.jpeg_encode(noise(3, np.uint16) >> 4, **options))
+    with pytest.raises(UserError, match=f"a JPEG {said} is not supported; convert it to a PNG or TIFF of 16 bits"):
+        read_picture(tmp_path / "a.jpg")
+
+
 def test_every_segment_of_a_jpeg_is_kept_or_told(tmp_path: Path):
     path = tmp_path / "a.jpg"
     Image.fromarray(smooth(3)).save(path, comment=b"a", dpi=(300, 300), exif=exif_bytes(), progressive=True)

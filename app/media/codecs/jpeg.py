@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from app.errors import UserError
 from app.media.codecs import pillow
 from app.media.codecs.metadata import sized_exif, tag_names
 from app.media.losses import not_kept
@@ -16,6 +17,8 @@ from app.model.picture import Picture
 START_OF_SCAN, END, COMMENT = 0xDA, 0xD9, 0xFE
 COMMENT_NAME = "Comment"
 APPLICATION = range(0xE0, 0xF0)
+FRAMES = {*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC}  # which begin with their bits; the others are tables
+LOSSLESS = (0xC3, 0xC7, 0xCB, 0xCF)
 MARKER = re.compile(rb"\xff[^\x00\xff\xd0-\xd7]")  # in a scan: neither a stuffed byte nor a restart
 # Of JFIF (ITU T.871, 10.1): where its unit is in a file, the units, dots an inch for one of each, and the most dots.
 UNIT_AT, INCH, CENTIMETRE, MOST_DOTS = 13, 1, 2, 0xFFFF
@@ -29,8 +32,24 @@ UNDERSTOOD = ("JFIF", "JFXX", "Exif", "http://ns.adobe.com/xap/1.0/", "ICC_PROFI
 
 def read(file: Path, max_pixels: int) -> Picture:
     """Read a JPEG, the first of its pictures."""
+    if (said := _beyond(file.read_bytes())) is not None:
+        raise UserError(f"Cannot read {file}: a JPEG {said} is not supported; convert it to a PNG or TIFF of 16 bits.")
     with pillow.opened("JPEG", file, max_pixels) as image:
         return pillow.picture_of(image, file, _losses(file.read_bytes(), getattr(image, "n_frames", 1) > 1))
+
+
+def _beyond(data: bytes) -> str | None:
+    """What its frame is that is coded as no decoder at hand reads (ITU T.81, B.2.2); None for what is usual."""
+    at = 2
+    while found := MARKER.search(data, at):
+        kind, body = data[found.start() + 1], found.end() + 2
+        if kind in FRAMES:
+            bits = data[body] if body < len(data) else 8
+            return "without loss" if kind in LOSSLESS else f"of {bits} bits a channel" if bits != 8 else None
+        if kind in (START_OF_SCAN, END) or body > len(data):
+            return None
+        at = body - 2 + struct.unpack_from(">H", data, found.end())[0]
+    return None
 
 
 def _losses(data: bytes, is_many: bool) -> list[str]:
