@@ -130,12 +130,12 @@ def animation_writer(
             options = replace(options, durations=[*lasting[:-1], lasting[-1] - 1, 1])
         with _Video(temporary, str(path), encoding, rate, container.even, options, (given, sound), cancel) as video:
 
-            def write(frame: Frame, number: int | None = None) -> None:
+            def give(frame: Frame, number: int | None = None) -> None:
                 nonlocal last
                 last = straight(frame)
                 video.write(last)
 
-            yield write
+            yield give
             if stands and last.size:
                 video.write(last)
             video.finish()

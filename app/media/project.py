@@ -42,6 +42,7 @@ class Project:
         clip: what is warped, where it moves.
         folder: where the recipe's names start from; a temporary one for a project that holds its pictures.
         path: the project's own file, if it has one.
+        seen: that file as it was when it was read or written last; None where that was not by this project.
         embedded: pictures are kept in the project and not referred to.
         keeper: removes the temporary folder when the last copy of this project is gone.
     """
@@ -54,6 +55,12 @@ class Project:
     embedded: bool = True
     keeper: tempfile.TemporaryDirectory[str] | None = field(default=None, repr=False)
     clip: Clip | None = field(default=None, repr=False)
+    seen: tuple[int, ...] | None = field(default=None, repr=False)
+
+    @property
+    def is_overtaken(self) -> bool:
+        """Something else has written into its file since."""
+        return self.path is not None and self.seen is not None and _seen(self.path) not in (None, self.seen)
 
     @property
     def is_linked(self) -> bool:
@@ -111,8 +118,9 @@ def load(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Project:
     """
     path = Path(path)
     try:
+        seen = _seen(path)
         with open_input(path, "project") as stream, Archive(stream) as archive:
-            return _read(path, archive, max_pixels)
+            return replace(_read(path, archive, max_pixels), seen=seen)
     except (UserError, MemoryError):
         raise
     except OSError as error:
@@ -137,7 +145,16 @@ def save(project: Project, path: str | os.PathLike[str], embedded: bool = True) 
         archive.writestr(RECIPE, recipe.text())
         for name, data in files.items():
             archive.writestr(name, data, zipfile.ZIP_STORED)  # pictures are compressed already
-    return replace(project, path=path, embedded=embedded)
+    return replace(project, path=path, embedded=embedded, seen=_seen(path))
+
+
+def _seen(path: Path) -> tuple[int, ...] | None:
+    """What tells a file from one that is written later in its place; None if there is none."""
+    try:
+        found = os.stat(path)
+    except OSError:
+        return None
+    return found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns
 
 
 def backup_of(path: Path) -> Path:

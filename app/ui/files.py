@@ -282,9 +282,13 @@ class Files:
     # -- saving -----------------------------------------------------------------------------------------------------
 
     def save(self, then: Callable[[], None] | None = None) -> None:
-        """Save where it was saved last; where that is nowhere, ask. `then`: what is done once it is saved."""
-        path = self.workspace.session.project.path
-        if path is None:
+        """Save where it was saved last; where that is nowhere, or not as it was left, ask.
+
+        `then`: what is done once it is saved.
+        """
+        project = self.workspace.session.project
+        path = project.path
+        if path is None or project.is_overtaken:
             self.ask_save(then)
         elif self.save_as(path) and then is not None:
             then()

@@ -50,7 +50,7 @@ class SaveDialog(Dialog):
         self.embed = self.must_embed or (preferences.embed and not self.must_link)
         self._picture = project.folder / (project.recipe.picture or "")
         self._bytes = len(project.data)
-        self._own = project.path
+        self._own, self._project = project.path, project
         self._preferences = preferences
         self._chooser = chooser
         self._write = write
@@ -88,6 +88,9 @@ class SaveDialog(Dialog):
         ui.wrapped(str(self.path), ui.palette.dim, 13)
         if os.path.exists(self.path) and self.path != self._own:
             ui.text("This file exists and will be replaced.", ui.palette.accent, 13)
+        elif self.path == self._own and self._project.is_overtaken:
+            said = "Something else has saved into this file since you opened it. What it saved will be replaced."
+            ui.wrapped(said, ui.palette.accent, 13)
         imgui.dummy(ImVec2(0, ui.px(2)))
         with ui.enabled(not (self.must_embed or self.must_link)):
             self.embed = ui.check("Keep the picture inside the project", self.embed)

@@ -738,6 +738,43 @@ def test_a_message_that_comes_or_goes_by_itself_is_drawn_until_it_fits(robot: Ro
     assert robot.editor.wants_frame()
 
 
+def test_saving_over_what_another_has_saved_asks_first(
+    robot: Robot, tmp_path: Path, widgets: Widgets, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told, wrapped = list[str](), Ui.wrapped
+    monkeypatch.setattr(Ui, "wrapped", lambda ui, words, *how: told.append(words) or wrapped(ui, words, *how))
+    robot.drag((0.3, 0.4), (0.45, 0.4))
+    robot.rest()
+    kept = tmp_path / "kept.fluidwarp"
+    assert robot.editor.files.save_as(kept)
+    robot.key("ctrl+s")
+    robot.frame(count=3)
+    assert not robot.editor.dialogs.shown
+    other = projects.save(projects.load(kept), kept)
+    theirs = kept.read_bytes()
+    robot.key("ctrl+s")
+    robot.frame(count=3)
+    dialog = robot.editor.dialogs.shown[-1]
+    assert isinstance(dialog, SaveDialog)
+    assert dialog.path == kept
+    assert "Something else has saved into this file since you opened it. What it saved will be replaced." in told
+    robot.key("escape")
+    robot.frame(count=2)
+    assert kept.read_bytes() == theirs
+    assert not other.is_overtaken
+    robot.key("ctrl+s")
+    robot.frame(count=3)
+    widgets.click("Save")
+    robot.frame(count=2)
+    assert not robot.editor.dialogs.shown
+    assert not robot.editor.session.project.is_overtaken
+    robot.key("ctrl+s")
+    robot.frame(count=3)
+    assert not robot.editor.dialogs.shown
+    kept.unlink()  # what is gone can be saved again without a question
+    assert not robot.editor.session.project.is_overtaken
+
+
 def test_saving_asks_for_a_name_and_where_the_picture_goes(robot: Robot, tmp_path: Path, widgets: Widgets) -> None:
     robot.drag((0.3, 0.4), (0.45, 0.4))
     robot.rest()
