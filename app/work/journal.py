@@ -30,6 +30,7 @@ from app.model.schema import Model, frozen, plain
 from app.model.undo import DEFAULT_BUDGET, LISTS, Entry, History
 
 VERSION = 1
+MOST_RECORDS = 200_000  # a minute of painting has some hundred, and now and then all is written anew in a few
 MOST_DIGITS = 9  # of a version: no number is made of more
 _HEAD = "fluidwarp journal"
 
@@ -207,7 +208,7 @@ def read(data: bytes) -> tuple[Origin, Work]:
         Damaged: if not even its beginning is whole.
         Newer: if it was written by a newer fluidwarp.
     """
-    head, *lines = data.split(b"\n")[:-1] or [b""]
+    head, *lines = data.split(b"\n", MOST_RECORDS)[:-1] or [b""]
     words = head.decode("ascii", "replace").rsplit(" ", 2)
     if len(words) != 3 or words[0] != _HEAD or not (words[1].isdecimal() and words[2].isdecimal()):
         raise Damaged

@@ -394,6 +394,8 @@ def _look_into(held: LockedFolder) -> Found | None:
         raise Large
     with path.open("rb") as stream:
         origin, work = read(stream.read(MOST))
+    if work.is_cut and not work.is_unsaved:  # what is unsaved comes after what is damaged
+        raise Damaged
     try:
         when = datetime.fromtimestamp(path.stat().st_mtime)
     except (ValueError, OverflowError):  # the clock, or the disk, is wrong by thousands of years

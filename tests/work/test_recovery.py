@@ -605,6 +605,33 @@ def test_work_whose_last_is_damaged_is_found_with_a_sentence(desk: Desk) -> None
     found.leave()
 
 
+def test_work_whose_first_is_damaged_is_told_and_kept(desk: Desk) -> None:
+    for _ in range(3):
+        desk.push()
+        desk.write()
+    desk.die()
+    file = next(desk.root.rglob(recovery.JOURNAL))
+    head, opened, first, *later = file.read_bytes().splitlines(keepends=True)
+    damaged = b"".join([head, opened, first.replace(b"push", b"hush"), *later])
+    file.write_bytes(damaged)
+    found, (said,) = find(desk.root)
+    assert not found
+    assert said.endswith("is damaged and cannot be read; it is left there.")
+    assert file.read_bytes() == damaged
+
+
+def test_lines_of_nothing_in_a_journal_take_no_time(desk: Desk) -> None:
+    desk.push()
+    desk.write()
+    desk.die()
+    file = next(desk.root.rglob(recovery.JOURNAL))
+    with file.open("ab") as stream:
+        stream.write(b"\n" * 20_000_000)
+    (found,), notices = find(desk.root)
+    assert (found.work.strokes, notices) == (1, [])
+    found.leave()
+
+
 def test_work_that_no_recipe_may_hold_is_told_and_kept(desk: Desk) -> None:
     """Each of its parts is valid in itself; together they would be a hundred million ticks."""
     desk.push()
