@@ -22,7 +22,7 @@ MOST = 256 * 2**20  # bytes of a record: two million frames
 
 
 class Record:
-    """A line for each file of a sequence that was written: its number, what it was made of, and a digest of its bytes.
+    """A line for each file of a sequence that was written: its number, what it was made of, a digest of it, its bytes.
 
     It is a hidden file in the folder of the sequence. Each line is appended in one piece, so that several tasks can
     write to it at a time; one that is damaged means no more than that its file is made again.
@@ -53,9 +53,10 @@ class Record:
         """Whether the file of this number is there, byte for byte as it was made of what it would be made of now."""
         if self._lines is None:
             self._lines = dict(self._read())
-        line = self._lines.get(number)
+        line = self._lines.get(number, "")
         with suppress(OSError, UserError):
-            return line is not None and line == self._line(number)
+            # A file of another size is not read: it may be one without end.
+            return self._size(number) == line.rpartition(" ")[2] and line == self._line(number)
         return False
 
     def add(self, number: int) -> None:
@@ -73,7 +74,11 @@ class Record:
             raise cannot_write(self._path, error) from error
 
     def _line(self, number: int) -> str:
-        return f"{self._made_of(number)} {digest_of_file(numbered(self._pattern, number))}"
+        file = numbered(self._pattern, number)
+        return f"{self._made_of(number)} {digest_of_file(file)} {self._size(number)}"
+
+    def _size(self, number: int) -> str:
+        return str(os.stat(numbered(self._pattern, number)).st_size)
 
     def _ends_whole(self) -> bool:
         with self._path.open("rb") as stream:

@@ -262,6 +262,17 @@ def test_a_record_that_becomes_a_link_while_frames_are_written_is_not_followed(t
     assert (tmp_path / "precious").read_bytes() == before
 
 
+def test_a_file_that_has_become_longer_is_not_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    file = tmp_path / "f.1.png"
+    file.write_bytes(b"1")
+    record = Record(tmp_path / "f.%d.png", str)
+    record.add(1)
+    assert Record(tmp_path / "f.%d.png", str).holds(1)
+    os.truncate(file, 2**40)
+    monkeypatch.setattr("app.media.record.digest_of_file", lambda path: pytest.fail("it is read"))
+    assert not Record(tmp_path / "f.%d.png", str).holds(1)
+
+
 def test_a_picture_there_and_back_and_its_maps_go_on(folder: Path, fluidwarp: Run):
     """Frames that are shown twice, of one picture; and files of maps beside them, of which one is gone."""
     (folder / "a.toml").write_text(RECIPE + "[time]\nping_pong = true\n")
