@@ -371,7 +371,7 @@ def find(root: Path) -> tuple[list[Found], list[str]]:
             else:
                 found.append(one)
                 if one.work.is_cut:
-                    cut = f"The last of the unsaved work on “{one.origin.name}” is damaged"
+                    cut = f"A part of the unsaved work on “{one.origin.name}” is damaged"
                     notices.append(f"{cut}; what came before it can be restored.")
                 continue
         lock.release()
