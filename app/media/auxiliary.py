@@ -62,7 +62,8 @@ class Pictures:
         Raises UserError if it cannot be read, or has other proportions than the source.
         """
         if name not in self._maps:
-            given = read_map(self.folder / name)
+            size = self.source.width, self.source.height
+            given = read_map(self.folder / name, picture=size)
             if given.forward:
                 forward = f"{name} tells where each point goes"
                 raise UserError(
@@ -74,7 +75,7 @@ class Pictures:
                     f"Cannot use {name}: {int(nowhere.sum())} of its pixels are NaN, and each needs a value; "
                     "fill them where the map was made."
                 )
-            self._maps[name] = cropped(given.fitted(self.source.width, self.source.height)).values
+            self._maps[name] = cropped(given.fitted(*size)).values
             if folded := folds(self._maps[name]):
                 self.notice(f"{name} folds over itself in {folded} of its pixels")
         return self._maps[name]

@@ -8,10 +8,12 @@ from typing import Literal
 
 import numpy as np
 
-from app.errors import UserError
-
 PixelPlaces = Literal["centres", "corners", "pixels"]
 """The places an ST map that does nothing holds in a row of W pixels, times W: .5 to W-.5, 0 to W, 0 to W-1."""
+
+
+class MapError(ValueError):
+    """A map cannot be used; the reason and the mend, in words that follow the name of its file."""
 
 
 @dataclass(frozen=True)
@@ -45,20 +47,26 @@ class Displacement:
     def fitted(self, width: int, height: int) -> Displacement:
         """The map for a picture of width x height, its values in the longer sides of that.
 
-        Sizes may differ, proportions by no more than their rounding: raises `UserError` otherwise.
+        Raises:
+            MapError: see `check_proportions`.
         """
-        off = abs(height * self.width / width - self.height), abs(width * self.height / height - self.width)
-        if min(off) >= 1:
-            raise UserError(
-                f"The map is {self.width} x {self.height} and the picture {width} x {height}: "
-                "they must have the same proportions; crop the picture or make the map anew."
-            )
+        check_proportions((self.width, self.height), (width, height))
         longest = max(width, height)
         scale = self.longest / self.width * width / longest, self.longest / self.height * height / longest
         if scale == (1, 1):
             return self
         values = (self.values * np.array(scale)).astype(self.values.dtype)
         return Displacement(values, self.overscan, self.forward)
+
+
+def check_proportions(size: tuple[int, int], picture: tuple[int, int]) -> None:
+    """Raise `MapError` if proportions, of a map and of the picture it is for, differ by more than their rounding."""
+    (columns, rows), (width, height) = size, picture
+    if min(abs(height * columns / width - rows), abs(width * rows / height - columns)) >= 1:
+        raise MapError(
+            f"it is {columns} x {rows} and the picture {width} x {height}, and they must have the same proportions; "
+            "crop the picture or make the map anew"
+        )
 
 
 def cropped(displacement: Displacement) -> Displacement:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Callable
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any, Literal
 
@@ -14,8 +14,19 @@ import numpy as np
 
 from app.errors import UserError
 from app.media.animation import NumberedWriter, sequence_writer
-from app.media.codecs import exr
-from app.media.displacement import Displacement, PixelPlaces, cropped, from_offsets, from_st, to_offsets, to_st
+from app.media.codecs import exr, tiff
+from app.media.codecs.decoding import decoding, head_of
+from app.media.displacement import (
+    Displacement,
+    MapError,
+    PixelPlaces,
+    check_proportions,
+    cropped,
+    from_offsets,
+    from_st,
+    to_offsets,
+    to_st,
+)
 from app.media.files import replacing
 from app.media.inputs import MAX_PIXELS, check_size, open_input, read_start
 from app.media.pictures import read_picture
@@ -32,6 +43,9 @@ MAP_ENDINGS = (".exr", ".tif", ".tiff", ".flo", ".npy")
 
 # Names of the channels of an EXR that hold a map, whatever layer they are in.
 PAIRS = (("R", "G"), ("U", "V"), ("u", "v"), ("X", "Y"))
+
+Check = Callable[[int, int, int], int]
+"""What is asked with a map's width, height and overscan as its header tells them; gives the overscan that it has."""
 
 LARGEST = 1e30  # of what is no infinite value: in pixels it is still one of 32 bits
 
@@ -171,6 +185,7 @@ def read_map(
     grid: PixelPlaces | None = None,
     overscan: int | None = None,
     max_pixels: int = MAX_PIXELS,
+    picture: tuple[int, int] | None = None,
 ) -> Displacement:
     """Read a map, also one made elsewhere.
 
@@ -180,24 +195,28 @@ def read_map(
         kind, grid: what an EXR or TIFF holds; None believes its metadata, and without any takes it for an ST map on
             pixel centres.
         overscan: None believes the metadata, and is 0 without any.
+        picture: the size of the one that it is for.
 
     Raises:
-        UserError: if it is no map, damaged, infinite, or NaN everywhere.
+        UserError: if it is no map, damaged, infinite, or NaN everywhere; and, before its values are read, if it has
+            other proportions than the picture.
     """
     check_map(path)
     suffix = Path(path).suffix.lower()
-    if suffix in (".flo", ".npy"):
-        values = _read_flo(Path(path), max_pixels) if suffix == ".flo" else _read_npy(Path(path), max_pixels)
-        metadata, edge = {}, 0
-    else:
-        read = _read_exr if suffix == ".exr" else _read_tiff
-        values, metadata, edge = read(Path(path), max_pixels)
+
+    def check(width: int, height: int, told: int) -> int:
+        edge = told if overscan is None else overscan
+        if edge < 0 or 2 * edge >= min(width, height):
+            named = f"an overscan of {edge}" if overscan is None else f"--overscan {edge}"
+            raise UserError(f"Cannot read {path}: {named} leaves nothing of its {width} x {height} pixels.")
+        if picture is not None:
+            with telling_of(path):
+                check_proportions((width - 2 * edge, height - 2 * edge), picture)
+        return edge
+
+    read = {".flo": _read_flo, ".npy": _read_npy, ".exr": _read_exr}.get(suffix, _read_tiff)
+    values, metadata, edge = read(Path(path), max_pixels, check)
     values = _known(path, values)
-    edge = edge if overscan is None else overscan
-    if edge < 0 or 2 * edge >= min(values.shape[:2]):
-        height, width = values.shape[:2]
-        named = f"an overscan of {edge}" if overscan is None else f"--overscan {edge}"
-        raise UserError(f"Cannot read {path}: {named} leaves nothing of its {width} x {height} pixels.")
     if suffix == ".npy":
         return Displacement(values, edge)
     if suffix == ".flo":
@@ -208,6 +227,15 @@ def read_map(
         named = grid or metadata.get("grid", "centres")
         read = from_st(values, named if named in ("corners", "pixels") else "centres", edge)
     return Displacement(read.values, edge, forward=metadata.get("direction") == "forward")
+
+
+@contextmanager
+def telling_of(path: str | os.PathLike[str]) -> Iterator[None]:
+    """Let the `UserError` that is made of a `MapError` of the block name the map's file."""
+    try:
+        yield
+    except MapError as error:
+        raise UserError(f"Cannot use {path}: {error}.") from None
 
 
 def _known(path: str | os.PathLike[str], values: np.ndarray) -> np.ndarray:
@@ -225,7 +253,7 @@ def _known(path: str | os.PathLike[str], values: np.ndarray) -> np.ndarray:
     return np.where(nowhere[..., None], values.dtype.type(np.nan), values) if nowhere.any() else values
 
 
-def _read_flo(file: Path, max_pixels: int) -> np.ndarray:
+def _read_flo(file: Path, max_pixels: int, check: Check) -> tuple[np.ndarray, dict[str, str], int]:
     head = read_start(file, "map", 12)
     with open_input(file, "map") as stream:
         stream.seek(len(head))
@@ -237,11 +265,13 @@ def _read_flo(file: Path, max_pixels: int) -> np.ndarray:
             raise UserError(
                 f"Cannot read {file}: {width} x {height} offsets do not fit the length of the file; get it again."
             )
+        edge = check(width, height, 0)
         offsets = _in_memory(file, lambda: np.fromfile(stream, "<f4", 2 * width * height)).reshape(height, width, 2)
-        return np.where((np.abs(offsets) > FLO_UNKNOWN / 10).any(axis=2, keepdims=True), np.float32(np.nan), offsets)
+    unknown = (np.abs(offsets) > FLO_UNKNOWN / 10).any(axis=2, keepdims=True)
+    return np.where(unknown, np.float32(np.nan), offsets), {}, edge
 
 
-def _read_npy(file: Path, max_pixels: int) -> np.ndarray:
+def _read_npy(file: Path, max_pixels: int, check: Check) -> tuple[np.ndarray, dict[str, str], int]:
     with open_input(file, "map") as stream:
         try:
             headers = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
@@ -260,9 +290,10 @@ def _read_npy(file: Path, max_pixels: int) -> np.ndarray:
         check_size(file, shape[1], shape[0], max_pixels)
         if os.fstat(stream.fileno()).st_size < stream.tell() + math.prod(shape) * kind.itemsize:
             raise UserError(f"Cannot read {file}: it is truncated; get it again.")
+        edge = check(shape[1], shape[0], 0)
         stream.seek(0)
         values = _in_memory(file, lambda: np.load(stream, allow_pickle=False))
-        return np.ascontiguousarray(values)  # also one of Fortran's order
+        return np.ascontiguousarray(values), {}, edge  # also one of Fortran's order
 
 
 def _in_memory(file: Path, read: Callable[[], np.ndarray]) -> np.ndarray:
@@ -274,8 +305,14 @@ def _in_memory(file: Path, read: Callable[[], np.ndarray]) -> np.ndarray:
         raise UserError(f"Cannot read {file}: {error.strerror or error}.") from None
 
 
-def _read_exr(file: Path, max_pixels: int) -> tuple[np.ndarray, dict[str, str], int]:
-    channels, header = exr.read_channels(file, max_pixels)
+def _read_exr(file: Path, max_pixels: int, check: Check) -> tuple[np.ndarray, dict[str, str], int]:
+    edge = 0
+
+    def check_header(header: Mapping[str, Any]) -> None:
+        nonlocal edge
+        edge = check(*_shown(header))
+
+    channels, header = exr.read_channels(file, max_pixels, check_header)
     for x, y in PAIRS:
         found = {key.rpartition(".")[2]: plane for key, plane in reversed(channels.items())}
         if x in found and y in found:
@@ -284,28 +321,34 @@ def _read_exr(file: Path, max_pixels: int) -> tuple[np.ndarray, dict[str, str], 
     else:
         raise UserError(f"Cannot read {file}: its channels {' '.join(channels)} are not a map; it needs R and G.")
     metadata = {key.removeprefix("fluidwarp/"): value for key, value in header.items() if key.startswith("fluidwarp/")}
-    (left, top), (right, bottom) = ((int(x), int(y)) for x, y in header["dataWindow"])
-    (first_x, first_y), (last_x, last_y) = ((int(x), int(y)) for x, y in header["displayWindow"])
-    # as much overscan as all four sides have
-    edge = max(0, min(first_x - left, first_y - top, right - last_x, bottom - last_y))
-    width, height = last_x - first_x + 1 + 2 * edge, last_y - first_y + 1 + 2 * edge
+    (left, top), (first_x, first_y) = (tuple(map(int, header[name][0])) for name in ("dataWindow", "displayWindow"))
+    width, height, around = _shown(header)
     shown = np.full((height, width, 2), np.nan, np.float32)
-    exr.place_window(values, (left - first_x + edge, top - first_y + edge), shown)
+    exr.place_window(values, (left - first_x + around, top - first_y + around), shown)
     return shown, metadata, edge
 
 
-def _read_tiff(file: Path, max_pixels: int) -> tuple[np.ndarray, dict[str, str], int]:
-    import tifffile
+def _shown(header: Mapping[str, Any]) -> tuple[int, int, int]:
+    """The width and height of what is read of an EXR, and as much overscan as all four sides have."""
+    (left, top), (right, bottom) = ((int(x), int(y)) for x, y in header["dataWindow"])
+    (first_x, first_y), (last_x, last_y) = ((int(x), int(y)) for x, y in header["displayWindow"])
+    edge = max(0, min(first_x - left, first_y - top, right - last_x, bottom - last_y))
+    return last_x - first_x + 1 + 2 * edge, last_y - first_y + 1 + 2 * edge, edge
 
+
+def _read_tiff(file: Path, max_pixels: int, check: Check) -> tuple[np.ndarray, dict[str, str], int]:
+    head_of(file)
+    with decoding(file, "TIFF"):
+        width, height, description = tiff.head(file, max_pixels)
+    metadata: dict[str, str] = {}
+    try:
+        metadata = json.loads(description)["fluidwarp"]
+        edge = int(metadata["overscan"])
+    except (ValueError, TypeError, KeyError, OverflowError, RecursionError):  # made elsewhere
+        edge = 0
+    edge = check(width, height, edge)
     pixels = read_picture(file, max_pixels).pixels
     if pixels.shape[2] < 2 or pixels.dtype == np.uint8:
         raise UserError(f"Cannot read {file}: a map needs two channels of 16 or 32 bits; write it as 32-bit float.")
     values = pixels[..., :2] if pixels.dtype == np.float32 else pixels[..., :2] / np.float64(65535)
-    metadata: dict[str, str] = {}
-    with tifffile.TiffFile(file) as tiff:
-        try:
-            metadata = json.loads(tiff.pages.first.description)["fluidwarp"]
-            edge = int(metadata["overscan"])
-        except (ValueError, TypeError, KeyError, OverflowError, RecursionError):  # made elsewhere
-            edge = 0
     return values, metadata, edge

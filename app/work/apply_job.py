@@ -21,7 +21,7 @@ from app.media.files import check_kept, check_numbers, is_sequence, numbered_fil
 from app.media.formats import picture_format
 from app.media.holding import Losses, Written
 from app.media.inputs import MAX_PIXELS
-from app.media.maps import Kind, read_map
+from app.media.maps import Kind, read_map, telling_of
 from app.media.record import Record, digest_of, digest_of_file
 from app.media.source import Source, open_source
 from app.model.picture import Picture
@@ -63,9 +63,10 @@ class MapSource:
         check_numbers(self.path, files, range(min(files), max(files) + 1))
         return files
 
-    def read(self, file: Path) -> Displacement:
-        """One of the maps. Raises `UserError`."""
-        return read_map(file, kind=self.kind, grid=self.grid, overscan=self.overscan, max_pixels=self.max_pixels)
+    def read(self, file: Path, picture: tuple[int, int] | None = None) -> Displacement:
+        """One of the maps, for a picture of this size. Raises `UserError`."""
+        how = {"kind": self.kind, "grid": self.grid, "overscan": self.overscan, "max_pixels": self.max_pixels}
+        return read_map(file, **how, picture=picture)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -151,8 +152,15 @@ class _Applying:
     def _map(self, file: Path) -> Displacement:
         """The map in a file, which as a rule is the one of the frame before."""
         if self._read is None or self._read[0] != file:
-            self._read = file, self.order.maps.read(file)
+            picture = self.source.picture
+            self._read = file, self.order.maps.read(file, (picture.width, picture.height))
         return self._read[1]
+
+    def _sampled(self, given: Displacement, pixels: np.ndarray, target: Target) -> np.ndarray:
+        """Pixels looked up through the map that was read last. Raises `UserError`, which names its file."""
+        assert self._read is not None
+        with telling_of(self._read[0]):
+            return self.sampler.warped(given, pixels, target)
 
     def write_still(self) -> int:
         steps = steps_for(self.size)
@@ -194,7 +202,7 @@ class _Applying:
             pixels, given = picture.wide, self.sampler.widened(given, picture.margins)
             size = pixels.shape[1], pixels.shape[0]
         target = Target(size, self.sampler.how, parts(size[1]), alpha and kind.alpha)
-        found = self.sampler.warped(given, pixels, target)
+        found = self._sampled(given, pixels, target)
         look_up, quality = partial(self._look_up, given, size), self.sampler.how.quality
         layers = resample_layers(picture.layers, look_up, quality) if "layers" in kind.keeps else ()
         if picture.wide is None:
@@ -204,7 +212,7 @@ class _Applying:
     def _look_up(self, given: Displacement, size: tuple[int, int], pixels: np.ndarray, quality: Quality) -> np.ndarray:
         """The pixels of layers; see `along`."""
         how = replace(self.sampler.how, quality=quality, premultiplied=False)
-        return self.sampler.warped(given, pixels, Target(size, how, lambda rows: self.progress.check()))
+        return self._sampled(given, pixels, Target(size, how, lambda rows: self.progress.check()))
 
     def write_frames(self) -> int:
         order, outputs, clip, progress = self.order, self.outputs, self.source.clip, self.progress
@@ -260,7 +268,7 @@ class _Applying:
         given = self._map(self._file(number))
         if not is_own:
             target = Target(self.size, self.sampler.how, lambda rows: self.progress.check())
-            return self.sampler.warped(given, picture.pixels, target)
+            return self._sampled(given, picture.pixels, target)
         frame = self._warped(given, picture, lambda height: lambda rows: self.progress.check(), alpha=False)
         return frame.stripped() if self.outputs.strip else frame
 
@@ -308,6 +316,8 @@ def converted(source: MapSource, output: Path, kind: Kind, invert: bool, progres
             given = source.read(file)
             if device and (folded := folds(cropped(given).values)):
                 notices.append(f"{file.name} folds over itself in {folded} of its pixels, where it has no inverse")
-            write(inverted(device, given) if device else given, number)
+            with telling_of(file):
+                turned = inverted(device, given) if device else given
+            write(turned, number)
             progress.advance()
     return tuple(notices)

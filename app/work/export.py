@@ -355,7 +355,11 @@ class _Export:
                 target = Target(self.size, how, on_rows, alpha)
                 return looked_up(self.sampler, self.replay.seen, picture.pixels, target)
             except SamplingError as error:
-                raise UserError(f"The map cannot be applied: {error}.") from None
+                raise self._unusable(error) from None
+
+    def _unusable(self, error: SamplingError) -> UserError:
+        """Why the map as it is cannot be looked up, by the name of the one that the recipe begins with."""
+        return UserError(f"{self.recipe.map or 'The warp'} cannot be applied: {error}; use a smaller picture.")
 
     @property
     def _how(self) -> Sampling:
@@ -424,7 +428,7 @@ class _Export:
                 wide, resample_layers(picture.layers, partial(self._look_up, warp, target.size), how.quality)
             )
         except SamplingError as error:
-            raise UserError(f"The map cannot be applied: {error}.") from None
+            raise self._unusable(error) from None
         finally:
             warp.release()
 

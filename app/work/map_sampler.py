@@ -6,8 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from app.errors import UserError
-from app.media.displacement import Displacement, cropped, folds
+from app.media.displacement import Displacement, MapError, cropped, folds
 from app.media.files import is_sequence
 from app.work.export import Target, looked_up, opaque_value, with_alpha
 from app.work.layers import widened
@@ -51,14 +50,14 @@ class MapSampler:
             self._map.release()
 
     def warped(self, given: Displacement, pixels: np.ndarray, target: Target) -> np.ndarray:
-        """Pixels (h, w, c) looked up through the map. Raises `UserError` where that cannot be."""
+        """Pixels (h, w, c) looked up through the map. Raises `MapError` where that cannot be."""
         try:
             if given is not self._given or self._map is None:
                 self._take(given, pixels)
             assert self._map is not None
             found = looked_up(self._sampler, self._map, pixels, target)
         except (SamplingError, FieldError) as error:
-            raise UserError(f"The map cannot be applied: {error}.") from None
+            raise MapError(str(error)) from None
         return found if self._outside is None else emptied(found, self._outside, target.how.edges, target.alpha)
 
     def _take(self, given: Displacement, pixels: np.ndarray) -> None:
@@ -93,11 +92,11 @@ def inverted(device: Device, given: Displacement) -> Displacement:
     """The map the other way round: where the points of the original go, if it told where they come from.
 
     Raises:
-        UserError: if the map is too small, too narrow or too large to be looked up.
+        MapError: if the map has holes, or is too small, too narrow or too large to be looked up.
     """
     values = cropped(given).values
     if np.isnan(values).any():
-        raise UserError("the map is NaN in places, and cannot be inverted; fill it first")
+        raise MapError("it is NaN in places, and cannot be inverted; fill it first")
     width, height = given.width, given.height
     try:
         warp = WarpMap(device, Grid.for_picture(width, height, min(max(width, height), MOST_CELLS)), (width, height))
@@ -108,7 +107,7 @@ def inverted(device: Device, given: Displacement) -> Displacement:
         finally:
             warp.release()
     except ValueError as error:
-        raise UserError(f"the map cannot be inverted: {error}") from None
+        raise MapError(f"it cannot be inverted: {error}") from None
     return Displacement(found.astype(np.float32), 0, not given.forward)
 
 

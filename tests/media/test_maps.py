@@ -16,7 +16,17 @@ import tifffile
 from app.errors import UserError
 from app.media import files
 from app.media.codecs.exr import read_channels
-from app.media.displacement import Displacement, PixelPlaces, cropped, folds, from_offsets, from_st, to_offsets, to_st
+from app.media.displacement import (
+    Displacement,
+    MapError,
+    PixelPlaces,
+    cropped,
+    folds,
+    from_offsets,
+    from_st,
+    to_offsets,
+    to_st,
+)
 from app.media.maps import Kind, holds, map_writer, read_map, write_map
 from app.media.pictures import write_picture
 from app.model.picture import Picture
@@ -215,10 +225,39 @@ def test_fitting_to_a_picture():
     # 1000 x 667 laid on 512 x 342: a rounding of the sides changes the longer side's measure by as little
     fitted = swirl(342, 512).fitted(1000, 667)
     np.testing.assert_allclose(fitted.values, swirl(342, 512).values, rtol=2e-3)
-    with pytest.raises(UserError, match=r"The map is 64 x 48 and the picture 800 x 800: .* same proportions"):
+    with pytest.raises(MapError, match=r"it is 64 x 48 and the picture 800 x 800, .* same proportions"):
         map_.fitted(800, 800)
-    with pytest.raises(UserError, match="same proportions"):
+    with pytest.raises(MapError, match="same proportions"):
         map_.fitted(48, 64)
+
+
+@pytest.mark.parametrize("ending", [".exr", ".tif", ".flo", ".npy"])
+def test_a_map_of_other_proportions_is_refused_by_its_header(tmp_path: Path, ending: str):
+    """Its values, which may be 400 million, are not read for that: these would be refused, too."""
+    path = tmp_path / f"m{ending}"
+    write_map(path, Displacement(np.full((32, 64, 2), np.inf, np.float32)))
+    with pytest.raises(UserError, match=rf"Cannot use .*/m\{ending}: it is 64 x 32 and the picture 30 x 30, and they"):
+        read_map(path, picture=(30, 30))
+    with pytest.raises(UserError, match=r"it is 44 x 12 and the picture 640 x 320, "):
+        read_map(path, picture=(640, 320), overscan=10)
+    with pytest.raises(UserError, match=r"infinite|all of it is NaN"):
+        read_map(path, picture=(640, 320))
+
+
+def test_a_tiff_map_on_its_side_is_for_the_picture_it_is_turned_to(tmp_path: Path):
+    tifffile.imwrite(
+        tmp_path / "m.tif", np.full((8, 6, 3), 0.5, np.float32), photometric="rgb", extratags=[(274, "H", 1, 6, True)]
+    )
+    assert read_map(tmp_path / "m.tif", picture=(16, 12)).width == 8
+    with pytest.raises(UserError, match="it is 8 x 6 and the picture 12 x 16"):
+        read_map(tmp_path / "m.tif", picture=(12, 16))
+
+
+def test_a_picture_of_another_kind_with_the_ending_of_a_tiff_is_told(tmp_path: Path):
+    write_picture(tmp_path / "a.png", Picture(np.zeros((8, 8, 3), np.uint16)))
+    (tmp_path / "a.png").rename(tmp_path / "m.tif")
+    with pytest.raises(UserError, match=r"Cannot read .*/m\.tif: the TIFF file is .* damaged \(not a TIFF file"):
+        read_map(tmp_path / "m.tif")
 
 
 # What must be refused -----------------------------------------------------------------------------------------------
@@ -241,7 +280,6 @@ def test_infinite_places_are_refused(tmp_path: Path, ending: str):
         read_map(tmp_path / f"a{ending}")
 
 
-@pytest.mark.parametrize("ending", [".exr", ".tif", ".flo", ".npy"])
 def test_an_array_of_fortrans_order_is_a_map_as_any(tmp_path: Path) -> None:
     values = np.random.default_rng(0).random((5, 7, 2), np.float32) / 8
     np.save(tmp_path / "a.npy", np.asfortranarray(values))
@@ -255,6 +293,7 @@ def test_values_that_are_infinite_in_32_bits_are_refused(tmp_path: Path) -> None
         read_map(tmp_path / "a.npy")
 
 
+@pytest.mark.parametrize("ending", [".exr", ".tif", ".flo", ".npy"])
 def test_nan_is_kept(tmp_path: Path, ending: str):
     map_ = swirl(8, 9)
     map_.values[3, 5] = np.nan

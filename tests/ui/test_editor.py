@@ -1023,7 +1023,7 @@ def test_maps_that_do_not_fit_leave_the_work_alone(robot: Robot, tmp_path: Path)
         robot.editor.messages.shown.clear()
         robot.drop(tmp_path / name)
         assert said in robot.editor.messages.shown[-1].text, name
-        assert name in robot.editor.messages.shown[-1].text or said == "proportions"
+        assert name in robot.editor.messages.shown[-1].text
         assert robot.editor.session.recipe is recipe
         assert np.array_equal(robot.warp(), warp)
 

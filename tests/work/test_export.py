@@ -488,9 +488,9 @@ def test_what_cannot_be_written(device: Device, clip: Path, picture: Path, tmp_p
     with pytest.raises(UserError, match="there is no such file"):
         apply(device, tmp_path / "n.%03d.exr", picture, tmp_path / "out.gif")
     write_map(tmp_path / "m.npy", Displacement(np.zeros((64, 64, 2), np.float32)))
-    with pytest.raises(UserError, match="must have the same proportions"):
+    with pytest.raises(UserError, match=r"m\.npy: .* must have the same proportions"):
         apply(device, tmp_path / "m.npy", picture, tmp_path / "out.png")
-    with pytest.raises(UserError, match="must have the same proportions"):
+    with pytest.raises(UserError, match=r"m\.npy: .* must have the same proportions"):
         render(device, 'map = "m.npy"\n' + WHIRL, picture, tmp_path / "out.png")
     with pytest.raises(UserError, match="'map' warps coordinates"):
         Recipe.parse('map = "m.npy"\nmode = "density"')
@@ -624,6 +624,23 @@ def test_one_place_a_pixel_is_as_sharp_as_a_spline(device: Device, tmp_path: Pat
     assert energy["1"] == pytest.approx(sharpness(reference), rel=0.05)
 
 
+def test_a_map_that_cannot_be_looked_up_or_inverted_is_named(device: Device, tmp_path: Path) -> None:
+    picture = tmp_path / "in.png"
+    write_picture(picture, Picture(scene()))
+    write_map(tmp_path / "tiny.exr", Displacement(np.zeros((4, WIDTH * 4 // HEIGHT, 2), np.float32)))
+    with pytest.raises(UserError, match=r"Cannot use .*/tiny\.exr: a map of shape .* from 6 x 6 is wanted\."):
+        apply(device, tmp_path / "tiny.exr", picture, tmp_path / "out.png")
+    holes = np.zeros((HEIGHT, WIDTH, 2), np.float32)
+    holes[3, 4] = np.nan
+    write_map(tmp_path / "holes.exr", Displacement(holes, forward=True))
+    said = r"Cannot use .*/holes\.exr: it is NaN in places, and cannot be inverted; fill it first\."
+    with pytest.raises(UserError, match=said):
+        apply(device, tmp_path / "holes.exr", picture, tmp_path / "out.png")
+    with pytest.raises(UserError, match=said):
+        converted(MapSource(tmp_path / "holes.exr"), tmp_path / "out.exr", "st", True, Progress())
+    assert not list(tmp_path.glob("out.*"))
+
+
 def test_a_map_that_tears_a_large_picture_is_told(device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """Ours does not: but a recipe may begin with one from elsewhere."""
     torn = np.zeros((HEIGHT, WIDTH, 2), np.float32)
@@ -631,6 +648,6 @@ def test_a_map_that_tears_a_large_picture_is_told(device: Device, tmp_path: Path
     np.save(tmp_path / "torn.npy", torn)
     monkeypatch.setattr("app.work.export.Sampler", partial(Sampler, whole=2_000, tile=(48, 32)))
     job = Job(Recipe.parse(f'map = "torn.npy"\n{WHIRL}'), Picture(scene()), tmp_path, Outputs(tmp_path / "x.png"))
-    with pytest.raises(UserError, match="The map cannot be applied: the map tears a patch"):
+    with pytest.raises(UserError, match=r"^torn\.npy cannot be applied: the map tears a patch"):
         run(device, job, Progress())
     assert not (tmp_path / "x.png").exists()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -59,16 +59,19 @@ def channel_names(file: Path) -> list[str]:
         return [channel.name for channel in OpenEXR.File(str(file), header_only=True).header()["channels"]]
 
 
-def read_channels(file: Path, max_pixels: int = MAX_PIXELS) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+def read_channels(
+    file: Path, max_pixels: int = MAX_PIXELS, check: Callable[[dict[str, Any]], None] = lambda header: None
+) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     """The channels (h, w) float32 by name, filling the data window, and the header of an EXR's first part.
 
-    Raises `UserError`.
+    check: is called with the header before anything else is read. Raises `UserError`.
     """
     import OpenEXR
 
     head_of(file)
     with decoding(file, "OpenEXR"), quiet():
         header = _headers(file, max_pixels)[0]
+        check(header)
         exr = OpenEXR.File(str(file), separate_channels=True)
         # a file that ends early is announced on stdout, not raised: it just has no part
         channels = exr.channels() if exr.parts else {}

@@ -69,6 +69,21 @@ def _pages(tiff: Any) -> Iterator[Any]:
         yield page
 
 
+def head(file: Path, max_pixels: int) -> tuple[int, int, str]:
+    """The width and height of a TIFF's first page once it is upright, and its description."""
+    import tifffile
+
+    tifffile.logger().setLevel(logging.CRITICAL)
+    with tifffile.TiffFile(file) as tiff:
+        page: Any = tiff.pages[0]
+        size = page.imagewidth, page.imagelength
+        check_size(file, *size, max_pixels, page.samplesperpixel)
+        orientation = page.tags.get(ORIENTATION)
+        if orientation is not None and int(orientation.value) in range(5, 9):
+            size = size[::-1]
+        return *size, page.description
+
+
 def read(file: Path, max_pixels: int, place: int | None = None) -> Picture:
     """Read a page of a TIFF; where none is asked for the first, and what is lost of the others is told."""
     import tifffile
