@@ -82,15 +82,30 @@ def writable(path: str | os.PathLike[str]) -> Path:
             raise UserError(f"Cannot write {path}: it is not an ordinary file; give another name.")
         if not target.parent.is_dir():
             raise UserError(f"Cannot write {path}: there is no folder {target.parent}; make it first.")
-        if target.exists() and not os.access(target, os.W_OK):  # it would be replaced all the same
+        if target.exists() and (number := _forbidden(target, os.W_OK)):  # it would be replaced all the same
+            if number == errno.EROFS:
+                raise cannot_write(path, OSError(number, ""))
             raise UserError(
                 f"Cannot write {path}: that file is read-only; change its permissions or give another name."
             )
     except OSError as error:  # a name that is too long, a folder that cannot be looked into
         raise cannot_write(path, error) from None
-    if not os.access(target.parent, os.W_OK | os.X_OK):
-        raise UserError(f"Cannot write {path}: {MENDS[errno.EACCES]}.")
+    if number := _forbidden(target.parent):
+        raise cannot_write(path, OSError(number, ""))
     return target
+
+
+def _forbidden(path: Path, mode: int = os.W_OK | os.X_OK) -> int:
+    """The number of the system's error if what is there, as a rule a folder, may not be written to; else 0.
+
+    `os.access` does not say whether it is permissions or a disk that is read-only, whoever asks.
+    """
+    if os.access(path, mode):
+        return 0
+    with suppress(AttributeError, OSError):  # Windows has no statvfs
+        if os.statvfs(path).f_flag & os.ST_RDONLY:
+            return errno.EROFS
+    return errno.EACCES
 
 
 def make_folder(path: Path) -> None:
@@ -107,7 +122,7 @@ def check_folder(path: Path) -> None:
         there = next(folder for folder in (path, *path.absolute().parents) if folder.exists())
     except OSError as error:
         raise cannot_write(path, error) from None
-    number = errno.ENOTDIR if not there.is_dir() else 0 if os.access(there, os.W_OK | os.X_OK) else errno.EACCES
+    number = errno.ENOTDIR if not there.is_dir() else _forbidden(there)
     if number:
         raise cannot_write(path, OSError(number, os.strerror(number)))
 

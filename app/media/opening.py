@@ -9,7 +9,7 @@ from pathlib import Path
 
 from app.errors import UserError
 from app.media.inputs import MAX_PIXELS
-from app.media.project import Project, is_project, load
+from app.media.project import Project, is_project, load, named_in
 from app.media.recipes import read_recipe
 from app.media.source import CLIP_ENDINGS, PICTURE_ENDINGS, Source, open_source
 from app.model.picture import Picture
@@ -63,8 +63,11 @@ class Opened:
             UserError: if there is none, or it cannot be read.
         """
         file = self.source_file(other)
+        if other is not None:
+            return open_source(other, max_pixels, animated)
         if file is not None:
-            return open_source(file, max_pixels, animated)
+            with named_in(self.label, file):
+                return open_source(file, max_pixels, animated)
         assert self.project is not None
         return Source(self.project.picture, self.project.clip if animated else None)
 

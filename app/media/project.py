@@ -7,6 +7,7 @@ import os
 import tempfile
 import zipfile
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -106,8 +107,23 @@ def from_recipe(path: str | os.PathLike[str]) -> Project:
     recipe = read_recipe(path)
     if recipe.picture is None:
         raise UserError(f"{path} names no picture; open a picture first, then apply the recipe to it")
-    source, data = read_source(path.parent / recipe.picture)
+    with named_in(path, path.parent / recipe.picture):
+        source, data = read_source(path.parent / recipe.picture)
     return Project(recipe, source.picture, data, path.parent, clip=source.clip)
+
+
+@contextmanager
+def named_in(path: str | os.PathLike[str], file: Path) -> Iterator[None]:
+    """Let a `UserError` of the block about the picture's `file` also tell which recipe or project names it."""
+    try:
+        yield
+    except UserError as error:
+        head, gone = f"Cannot read {shown(str(file))}: ", "there is no such file; check the name"
+        told, in_window = (
+            said.replace(head, f"Cannot read {file}, which {path} names: ", 1).replace(gone, f"{gone}, or put it back")
+            for said in (str(error), error.in_window)
+        )
+        raise UserError(told, error.status, in_window) from None
 
 
 def load(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Project:
@@ -199,7 +215,8 @@ def _read(path: Path, archive: Archive, max_pixels: int) -> Project:
     held = [name for name in picture_names(recipe) if name in names]
     embedded = recipe.picture in names
     if not embedded:
-        source, data = read_source(path.parent / recipe.picture, max_pixels)
+        with named_in(path, path.parent / recipe.picture):
+            source, data = read_source(path.parent / recipe.picture, max_pixels)
         return Project(recipe, source.picture, data, path.parent, path, embedded=False, clip=source.clip)
     if sum(archive.getinfo(name).file_size for name in held) > MOST_BYTES:
         raise UserError(f"{path} holds pictures of more than {MOST_BYTES >> 30} GB")

@@ -10,6 +10,7 @@ import time
 import zlib
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import cv2
@@ -950,6 +951,21 @@ def test_a_folder_without_permission(tmp_path: Path, monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(os, "access", lambda path, mode: False)  # root may write anywhere
     with pytest.raises(UserError, match="no permission; choose another folder"):
         write_picture(tmp_path / "a.png", Picture(smooth(3)))
+
+
+def test_a_disk_that_is_read_only_is_not_taken_for_permissions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    there = tmp_path / "there.png"
+    there.write_bytes(b"before")
+    monkeypatch.setattr(os, "access", lambda path, mode: False)
+    monkeypatch.setattr(os, "statvfs", lambda path: SimpleNamespace(f_flag=os.ST_RDONLY))
+    for path, check in (
+        (there, files.writable),
+        (tmp_path / "new.png", files.writable),
+        (tmp_path, files.check_folder),
+    ):
+        with pytest.raises(UserError) as error:
+            check(path)
+        assert str(error.value) == f"Cannot write {path}: the disk is read-only; choose another folder."
 
 
 def full_disk(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,6 +15,7 @@ import pytest
 
 from app.errors import UserError
 from app.media import project as projects
+from app.media.opening import open_recipe
 from app.media.pictures import write_picture
 from app.media.project import Project
 from app.model.picture import Picture
@@ -227,3 +228,20 @@ def test_a_link_to_a_project_stays_one(made: Project, tmp_path: Path) -> None:
     assert link.is_symlink()
     assert projects.load(link).recipe.name == "1"
     assert projects.load(tmp_path / "elsewhere" / "real.fluidwarp~").recipe.name == "0"
+
+
+def test_a_picture_that_is_gone_is_told_with_who_names_it(made: Project, tmp_path: Path) -> None:
+    work, recipe, picture = tmp_path / "work.fluidwarp", tmp_path / "r.toml", tmp_path / "photo.png"
+    projects.save(made, work, embedded=False)
+    recipe.write_text(f'version = 5\npicture = "{picture.name}"\nduration = 1\n')
+    picture.rename(tmp_path / "moved.png")
+    gone = f"Cannot read {picture}, which %s names: there is no such file; check the name, or put it back."
+    ways = (lambda: projects.load(work), work), (lambda: projects.from_recipe(recipe), recipe)
+    for opened, by in (*ways, (lambda: open_recipe(str(recipe)).source(), recipe)):
+        with pytest.raises(UserError) as error:
+            opened()
+        assert str(error.value) == error.value.in_window == gone % by
+    other = tmp_path / "other.png"
+    with pytest.raises(UserError) as error:  # that somebody else names
+        open_recipe(str(recipe)).source(other)
+    assert str(error.value) == f"Cannot read {other}: there is no such file; check the name."

@@ -197,7 +197,10 @@ def test_it_comes_back_with_its_project_and_is_missed_with_a_sentence(viewer: Ro
     clip.rename(tmp_path / "moved.mkv")
     go_to(viewer, 3)  # it is still open
     viewer.drop(tmp_path / "work.fluidwarp")
-    assert editor.messages.shown[-1].text == f"Cannot read {clip}: there is no such file; check the name."
+    assert editor.messages.shown[-1].text == (
+        f"Cannot read {clip}, which {tmp_path / 'work.fluidwarp'} names: there is no such file; "
+        "check the name, or put it back."
+    )
 
 
 @pytest.mark.parametrize("name", ["a.gif", "a.webp", "a.tif", "s.%03d.png"])
