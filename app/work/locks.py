@@ -19,6 +19,9 @@ else:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
+NO_LINK = getattr(os, "O_NOFOLLOW", 0)  # which Windows does not have
+
+
 class Lock:
     """A file that is held by this process alone, until it is released or the process ends."""
 
@@ -30,9 +33,9 @@ class Lock:
         """Hold the file `path`, made if need be; None where somebody else holds it, or has just removed it.
 
         Raises:
-            OSError: if it cannot be made, or there are no locks on this disk.
+            OSError: if it cannot be made, is a link, or there are no locks on this disk.
         """
-        handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)  # closed in every process that this one starts
+        handle = os.open(path, os.O_RDWR | os.O_CREAT | NO_LINK, 0o600)  # closed in every process that this one starts
         try:
             try_lock(handle)
             held = cls(handle)

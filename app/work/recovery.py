@@ -6,6 +6,7 @@ can be locked belongs to nobody that lives.
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 import stat
@@ -22,7 +23,7 @@ from app.media.project import Project
 from app.model.document import Document
 from app.model.undo import DEFAULT_BUDGET
 from app.work.journal import Damaged, Newer, Origin, Work, beginning, continuation, picture_file, project_of, read
-from app.work.locks import Lock
+from app.work.locks import NO_LINK, Lock
 
 JOURNAL = "work.journal"
 NEW = f"{JOURNAL}.new"  # until it is whole
@@ -33,7 +34,7 @@ MOST = DEFAULT_BUDGET  # bytes of a journal: a history takes more in memory than
 PAUSE = 0.25  # seconds in which the records of a fluid that comes to rest are put together; a stroke waits for nothing
 AGAIN = 5.0  # seconds after which what could not be written is tried again
 LEAVING = 5.0  # seconds that the disk may take when the program ends
-BINARY = getattr(os, "O_BINARY", 0)  # Windows writes other line ends without it
+PLAIN = NO_LINK | getattr(os, "O_BINARY", 0)  # Windows writes other line ends without it
 
 
 class Large(Exception):
@@ -235,7 +236,7 @@ class Journal:
         folder = self._held.folder
         path, temporary = folder / JOURNAL, folder / NEW
         with temporary_file(temporary):
-            file = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | BINARY, 0o600)
+            file = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | PLAIN, 0o600)
             try:
                 for line in beginning(Origin.of(project), work):
                     _write_all(file, line)
@@ -247,7 +248,7 @@ class Journal:
             finally:
                 os.close(file)
             os.replace(temporary, path)
-        self._file = os.open(path, os.O_WRONLY | os.O_APPEND | BINARY)
+        self._file = os.open(path, os.O_WRONLY | os.O_APPEND | PLAIN)
         self._most = min(2 * self._size + SLACK, MOST)
         for changed in (folder, self._root):
             sync(changed)
@@ -344,11 +345,13 @@ def find(root: Path) -> tuple[list[Found], list[str]]:
     except OSError as error:
         return [], [_unread(root, error)]
     for folder in folders:
+        if folder.is_symlink():  # to what may be anybody's
+            notices.append(_unread(folder, OSError(errno.ELOOP, "")))
+            continue
         try:
-            os.stat(folder)
             lock = Lock.take(folder / LOCK)
         except OSError as error:
-            if folder.is_symlink() or os.path.lexists(folder / JOURNAL):
+            if os.path.lexists(folder / JOURNAL):
                 notices.append(_unread(folder, error))
             continue
         if lock is None:
@@ -379,7 +382,8 @@ def find(root: Path) -> tuple[list[Found], list[str]]:
 
 
 def _unread(folder: Path, error: OSError) -> str:
-    return f"The journal of unsaved work in {folder} cannot be read ({error.strerror}); it is left there."
+    why = "it is a link, or something in it is" if error.errno == errno.ELOOP else error.strerror
+    return f"The journal of unsaved work in {folder} cannot be read ({why}); it is left there."
 
 
 def _look_into(held: LockedFolder) -> Found | None:
@@ -387,7 +391,9 @@ def _look_into(held: LockedFolder) -> Found | None:
     path = held.folder / JOURNAL
     if not os.path.lexists(path):
         return None
-    status = path.stat()
+    status = path.lstat()
+    if stat.S_ISLNK(status.st_mode):
+        raise OSError(errno.ELOOP, "")
     if not stat.S_ISREG(status.st_mode):  # a folder, or a pipe, for which one would wait for ever
         raise Damaged
     if status.st_size > MOST:

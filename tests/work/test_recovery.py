@@ -422,6 +422,49 @@ def test_what_cannot_be_read_is_left_alone_with_a_sentence(desk: Desk, data: byt
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="links and pipes are made otherwise there")
+@pytest.mark.parametrize("place", [recovery.JOURNAL, "lock", "."])
+def test_no_link_among_the_journals_is_followed(desk: Desk, place: str) -> None:
+    """Whether it leads somewhere or not: nothing is made, removed or written there."""
+    desk.push()
+    desk.die()
+    folder = next(desk.root.rglob(recovery.JOURNAL)).parent
+    path, kept = Path(os.path.normpath(folder / place)), desk.root.parent / "kept"
+    path.rename(kept)
+    path.symlink_to(kept)
+    before = {file: file.read_bytes() for file in desk.root.parent.rglob("*") if file.is_file()}
+    for _ in range(2):
+        found, (notice,) = find(desk.root)
+        assert found == []
+        assert notice == (
+            f"The journal of unsaved work in {folder} cannot be read (it is a link, or something in it is); "
+            "it is left there."
+        )
+        assert path.is_symlink()
+        assert {file: file.read_bytes() for file in desk.root.parent.rglob("*") if file.is_file()} == before
+        if kept.is_file() and place == "lock":  # now it leads nowhere
+            kept.unlink()
+            before = {file: data for file, data in before.items() if file not in (kept, path)}
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="links are made otherwise there")
+def test_a_journal_is_not_written_through_a_link(desk: Desk) -> None:
+    desk.push()
+    desk.die()
+    (victim := desk.root.parent / "victim").write_bytes(b"of somebody")
+    folder = next(desk.root.rglob(recovery.JOURNAL)).parent
+    (folder / recovery.NEW).symlink_to(victim)
+    again = Desk(desk.root, desk.project)
+    again.journal = Journal(desk.root, found_in(desk.root).held)
+    again.push(2)
+    until(lambda: again.journal.trouble is not None)
+    assert "it is a link; remove it" in (again.journal.trouble or "")
+    again.push()  # the link is gone with what was to be written in its place
+    again.die()
+    assert victim.read_bytes() == b"of somebody"
+    assert is_all_of(found_in(desk.root), again.document)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="links and pipes are made otherwise there")
 @pytest.mark.parametrize("what", ["folder", "link", "pipe"])
 @pytest.mark.parametrize("place", [recovery.JOURNAL, "lock", ".", ".."])
 def test_what_is_no_file_is_told_in_a_sentence_and_nothing_of_it_is_removed(desk: Desk, what: str, place: str) -> None:
