@@ -202,7 +202,9 @@ def _line(record: dict[str, Any]) -> bytes:
 
 
 def read(data: bytes) -> tuple[Origin, Work]:
-    """The work in a journal, up to the last record that is whole; what comes after a torn one is not looked at.
+    """The work in a journal, up to the last record that is whole; what comes after a torn one is not followed.
+
+    It says what it changes in what is lost: and a stroke in a picture that lacks one before it is not what was painted.
 
     Raises:
         Damaged: if not even its beginning is whole.

@@ -375,7 +375,7 @@ def find(root: Path) -> tuple[list[Found], list[str]]:
                 found.append(one)
                 if one.work.is_cut:
                     cut = f"A part of the unsaved work on “{one.origin.name}” is damaged"
-                    notices.append(f"{cut}; what came before it can be restored.")
+                    notices.append(f"{cut}; what came before it can be restored, and what came after it cannot.")
                 continue
         lock.release()
     return sorted(found, key=lambda one: one.when, reverse=True), notices

@@ -643,7 +643,8 @@ def test_work_whose_last_is_damaged_is_found_with_a_sentence(desk: Desk) -> None
     *lines, third, fourth = file.read_bytes().splitlines(keepends=True)
     file.write_bytes(b"".join([*lines, third.replace(b"push", b"hush"), fourth]))
     (found,), notices = find(desk.root)
-    assert notices == ["A part of the unsaved work on “pattern” is damaged; what came before it can be restored."]
+    said = "damaged; what came before it can be restored, and what came after it cannot."
+    assert notices == [f"A part of the unsaved work on “pattern” is {said}"]
     assert 0 < found.work.strokes < 3
     found.leave()
 
