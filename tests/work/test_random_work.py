@@ -15,4 +15,5 @@ def test_random_work_is_undone_saved_and_opened_again_as_it_was(device: Device) 
 
 
 def test_a_recipe_of_any_numbers_is_refused_or_played(device: Device) -> None:
-    assert work.check_recipes(device, 0, examples=30)["played"] > 8
+    # Hypothesis also draws numbers that it finds in the modules that are loaded, so how many are played varies.
+    assert work.check_recipes(device, 0, examples=60)["played"] > 8
