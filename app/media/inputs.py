@@ -42,6 +42,15 @@ def open_input(path: str | os.PathLike[str], kind: str = "file", most: int | Non
         raise UserError(f"Cannot read {path}: {error.strerror or error}.") from None
 
 
+def state_of(path: str | os.PathLike[str]) -> tuple[int, ...] | None:
+    """What tells a file from one that is written later in its place; None if there is none."""
+    try:
+        found = os.stat(path)
+    except OSError:
+        return None
+    return found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns
+
+
 def _without_waiting(path: str, flags: int) -> int:
     """Open what may have become a pipe since it was looked at."""
     return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))

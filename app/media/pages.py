@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable, Generator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 from itertools import accumulate
@@ -19,7 +20,7 @@ from app.media.clip import DEEP, SHALLOW, WHOLE, FileClip, FrameRange
 from app.media.codecs import pillow, tiff
 from app.media.codecs.decoding import decoding, head_of
 from app.media.formats import kind_of
-from app.media.inputs import MAX_PIXELS
+from app.media.inputs import MAX_PIXELS, open_input, state_of
 from app.media.losses import lost
 from app.model.picture import Picture
 from app.progress import never
@@ -35,11 +36,13 @@ class Pages(FileClip):
     Attributes:
         kind: of the file, as in the table of formats.
         places: of the frames in the file, without what is none.
+        state: of the file when it was opened; see `state_of`.
     """
 
     kind: str
     places: tuple[int, ...]
     max_pixels: int
+    state: tuple[int, ...] | None = field(compare=False)
 
     def check(self, part: FrameRange) -> None:
         """Raise `UserError` if the part begins after the last frame."""
@@ -68,7 +71,7 @@ class Pages(FileClip):
     ) -> Generator[tuple[int, Picture], None, None]:
         """See `Clip`."""
         first, last = part
-        with decoding(self.path, self.kind):
+        with self._telling_of_changes(), decoding(self.path, self.kind):
             for number in range(first, min(len(self.places) if last is None else last + 1, len(self.places))):
                 if cancel():
                     raise Cancelled
@@ -83,7 +86,20 @@ class Pages(FileClip):
                     )
                 yield number, picture
 
+    @contextmanager
+    def _telling_of_changes(self) -> Iterator[None]:
+        """Let a `UserError` of the block say, instead of what it is in the file, that the file is another one now."""
+        try:
+            yield
+        except UserError:
+            if (state := state_of(self.path)) == self.state:
+                raise
+            how = "is gone" if state is None else "has changed"
+            mend = "put it back" if state is None else "open it again"
+            raise UserError(f"Cannot read {self.path}: it {how} since it was opened; {mend}.") from None
+
     def _page(self, place: int) -> Picture:
+        open_input(self.path, "clip").close()  # by now it may be a pipe, for which a decoder waits for ever
         if self.kind == "TIFF":
             return tiff.read(self.path, self.max_pixels, place)
         with pillow.opened(ANIMATED[self.kind], self.path, self.max_pixels) as image:
@@ -93,6 +109,7 @@ class Pages(FileClip):
 
 def read_pages(path: Path, first: Picture, max_pixels: int = MAX_PIXELS) -> Pages | None:
     """The clip in a file whose first frame is `first`; None if that is all there is. Raises `UserError`."""
+    state = state_of(path)
     kind = kind_of(path, head_of(path))
     if kind is None or kind.name not in (*ANIMATED, "TIFF"):
         return None
@@ -123,6 +140,7 @@ def read_pages(path: Path, first: Picture, max_pixels: int = MAX_PIXELS) -> Page
         kind=kind.name,
         places=tuple(places),
         max_pixels=max_pixels,
+        state=state,
     )
 
 

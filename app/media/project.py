@@ -15,7 +15,7 @@ from typing import Any
 from app.errors import UserError, printable, shown
 from app.media.clip import WHOLE, Clip
 from app.media.files import is_sequence, name_from, numbered_files, replacing
-from app.media.inputs import MAX_PIXELS, MOST_TEXT, Archive, open_input, read_input
+from app.media.inputs import MAX_PIXELS, MOST_TEXT, Archive, open_input, read_input, state_of
 from app.media.leftovers import temporary_folder
 from app.media.recipes import read_recipe
 from app.media.source import Source, open_source
@@ -61,7 +61,7 @@ class Project:
     @property
     def is_overtaken(self) -> bool:
         """Something else has written into its file since."""
-        return self.path is not None and self.seen is not None and _seen(self.path) not in (None, self.seen)
+        return self.path is not None and self.seen is not None and state_of(self.path) not in (None, self.seen)
 
     @property
     def is_linked(self) -> bool:
@@ -134,7 +134,7 @@ def load(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Project:
     """
     path = Path(path)
     try:
-        seen = _seen(path)
+        seen = state_of(path)
         with open_input(path, "project") as stream, Archive(stream) as archive:
             return replace(_read(path, archive, max_pixels), seen=seen)
     except (UserError, MemoryError):
@@ -161,16 +161,7 @@ def save(project: Project, path: str | os.PathLike[str], embedded: bool = True) 
         archive.writestr(RECIPE, recipe.text())
         for name, data in files.items():
             archive.writestr(name, data, zipfile.ZIP_STORED)  # pictures are compressed already
-    return replace(project, path=path, embedded=embedded, seen=_seen(path))
-
-
-def _seen(path: Path) -> tuple[int, ...] | None:
-    """What tells a file from one that is written later in its place; None if there is none."""
-    try:
-        found = os.stat(path)
-    except OSError:
-        return None
-    return found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns
+    return replace(project, path=path, embedded=embedded, seen=state_of(path))
 
 
 def backup_of(path: Path) -> Path:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import subprocess
 from fractions import Fraction
 from pathlib import Path
@@ -186,3 +187,29 @@ def test_pages_of_several_sizes_are_told(device: Device, tmp_path: Path):
         applied(device, tmp_path, tmp_path / "a.tif", "b.mp4")
     with pytest.raises(UserError, match="it has the frames 0-1, and none from 7 on"):
         applied(device, tmp_path, tmp_path / "a.tif", "b.mp4", part=(7, None))
+
+
+@pytest.mark.parametrize("ending", [".gif", ".webp", ".apng"])
+@pytest.mark.parametrize("other", ["gone", "shorter", "empty", "larger", "still", "pipe", "folder"])
+def test_a_file_that_another_has_taken_the_place_of_is_told(tmp_path: Path, ending: str, other: str):
+    if other == "pipe" and not hasattr(os, "mkfifo"):
+        pytest.skip("pipes are no files here")
+    path, new = animated(tmp_path / f"a{ending}"), tmp_path / f"new{ending}"
+    clip = open_source(path).clip
+    assert clip is not None
+    pictures = clip.pictures()
+    assert next(pictures)[0] == 0
+    whole, kind = path.read_bytes(), {".apng": "PNG"}.get(ending)
+    if other in ("shorter", "empty"):
+        path.write_bytes(whole[: len(whole) // 3 if other == "shorter" else 0])
+    elif other in ("larger", "still"):
+        size = (2 * WIDTH, HEIGHT) if other == "larger" else (WIDTH, HEIGHT)
+        Image.new("RGB", size).save(new, format=kind)
+        new.replace(path)
+    else:
+        path.unlink()
+        {"gone": lambda: None, "pipe": lambda: os.mkfifo(path), "folder": path.mkdir}[other]()
+    with pytest.raises(UserError) as error:
+        list(pictures)
+    how = "is gone since it was opened; put it back" if other == "gone" else None
+    assert str(error.value) == f"Cannot read {path}: it {how or 'has changed since it was opened; open it again'}."
