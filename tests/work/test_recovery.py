@@ -997,6 +997,7 @@ def test_a_picture_that_is_gone_is_told_in_the_window(starter: Starter, tmp_path
     robot = starter.start(away)
     (tmp_path / "pattern.png").rename(tmp_path / "moved.png")
     answer(robot, "Restore")
+    robot.until(lambda: bool(robot.editor.messages.shown))
     (message,) = robot.editor.messages.shown
     assert f"There is no {tmp_path / 'pattern.png'} any more" in message.text
     assert robot.editor.session.project.folder == away
