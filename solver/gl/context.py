@@ -6,6 +6,8 @@ import ctypes.util
 import os
 import re
 import sys
+import threading
+import weakref
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
@@ -90,9 +92,12 @@ class Context:
     """
 
     _current: ClassVar[Context | None] = None  # whose context is
+    _alive: ClassVar[weakref.WeakSet[Context]] = weakref.WeakSet()
 
     def __init__(self, ctx: moderngl.Context, owns_context: bool = False) -> None:
         self.ctx = ctx
+        self._thread = threading.get_ident()  # in which it is current; none of a forked process
+        self._alive.add(self)
         self._owns_context = owns_context
         Context._current = self  # as a new one is
         info = ctx.info
@@ -178,8 +183,10 @@ class Context:
         """Make its context the current one, if another device's was used last; to be called before any drawing.
 
         Raises:
-            ContextError: if it was released.
+            ContextError: if it was released, or made in another thread or process: GL draws nothing there, or hangs.
         """
+        if threading.get_ident() != self._thread:
+            raise ContextError("a device works only in the thread and the process that made it; make one in each")
         if Context._current is not self:
             if isinstance(self.ctx.mglo, moderngl.InvalidObject):
                 raise ContextError("the device was released")
@@ -204,3 +211,13 @@ class Context:
 
     def __exit__(self, *_: object) -> None:
         self.release()
+
+
+def _after_fork() -> None:
+    """In a forked process no context works: what draws for it are threads of the process before."""
+    for context in Context._alive:
+        context._thread = 0
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_after_fork)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 import sys
 import warnings
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, cast
 
@@ -530,12 +532,41 @@ def test_devices_beside_each_other_do_not_mix(device: Device) -> None:
                 here.step(0.1, forces)
             np.testing.assert_array_equal(here.u, wanted)
             assert here.impulse.is_empty
+        with pytest.raises(FieldError, match="another device"):  # it would be drawn into some texture of this one
+            Brush(device).expand(there, Tip((0.3, 0.3), (0.3, 0.3), 0.1), 1.0)
+        steered = Brush(device), Push(Tip((0.3, 0.3), (0.4, 0.3), 0.1), 0.1)
+        with pytest.raises(FieldError, match="another device"):
+            there.step(0.1, (), lambda faces: steered[0].make_up(there, steered[1], faces))
     here.step(0.1)
     assert np.isfinite(here.u).all()
     with pytest.raises(ContextError, match="released"):
         there.step(0.1)
     here.release()
     alone.release()
+
+
+def test_a_device_works_in_its_own_thread_and_process_only(fluid: Fluid) -> None:
+    """In another thread GL would draw nothing, in a forked process it would wait for ever."""
+    before, time = fluid.u, fluid.time
+
+    def is_refused() -> bool:
+        try:
+            fluid.step(0.1)
+        except ContextError as error:
+            return "thread and the process" in str(error)
+        return False
+
+    with ThreadPoolExecutor(1) as pool:
+        assert pool.submit(is_refused).result()
+    if hasattr(os, "fork"):
+        child = os.fork()
+        if not child:
+            os._exit(0 if is_refused() else 1)
+        assert os.waitpid(child, 0)[1] == 0
+    assert fluid.time == time
+    np.testing.assert_array_equal(fluid.u, before)
+    fluid.step(0.1)
+    assert not np.array_equal(fluid.u, before)
 
 
 def test_what_was_released_says_so(device: Device) -> None:
