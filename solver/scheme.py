@@ -113,7 +113,7 @@ class Scheme(ABC):
         Args:
             dt: seconds, of any size.
             forces: one or several: arrays (ny, nx, 2) on MAC faces, lengths / s^2; functions (x, y, t) that give both
-                components; or fields, each with its time law integrated over the step.
+                components; or pairs of a field on MAC faces and its time law integrated over the step.
             steer: is called with the velocity on MAC faces between diffusion and projection, and adds to it: there
                 brushes make up for what viscosity took.
 

@@ -26,6 +26,7 @@ from solver import (
     Handles,
     Masks,
     PaperFluid,
+    PaperWarpMap,
     Tip,
     Walls,
     WarpMap,
@@ -69,6 +70,11 @@ def fluid(device: Device) -> Any:
     fluid.project()
     yield fluid
     fluid.release()
+
+
+def float16(number: float) -> Any:
+    """In which the largest number that is accepted is infinite."""
+    return np.float16(number)
 
 
 WRONG: dict[str, tuple[Callable[[Any], object], str]] = {
@@ -203,6 +209,28 @@ WRONG: dict[str, tuple[Callable[[Any], object], str]] = {
             WarpMap(fluid.device, fluid.grid).follow(fluid, 0.1),
         ),
         "too fast",
+    ),
+    "an endless drag in 16 bits": (lambda fluid: FluidParams(drag=float16(np.inf)), "drag"),
+    "an endless diffusion in 16 bits": (
+        lambda fluid: Density(fluid.device, np.ones((12, 20)), float16(np.inf)),
+        "diffusion",
+    ),
+    "a grid beyond any float": (lambda fluid: Grid.for_picture(10**400, 16, 64), "larger than any float"),
+    "a brush beyond any float": (lambda fluid: Tip((0, 0), (0, 0), 0.1, 10**400), "larger than any float"),
+    "a negative strain": (lambda fluid: fluid.strain(-0.1), "step"),
+    "a velocity with holes": (lambda fluid: fluid.set_velocity(np.ma.masked_less(np.zeros((12, 20, 2)), 1)), "masked"),
+    "viscosity with holes": (lambda fluid: fluid.set_viscosity(np.ma.masked_less(np.zeros((12, 20)), 1)), "masked"),
+    "frozen places with holes": (lambda fluid: fluid.device.upload(np.ma.masked_less(np.zeros((3, 4)), 1)), "masked"),
+    "ragged rows": (lambda fluid: fluid.device.upload(cast(Any, [[1, 2], [3]])), "unequal length"),
+    "a force of a number as an array": (
+        lambda fluid: fluid.step(0.1, lambda x, y, t: cast(Any, np.array(3.0))),
+        "gave 1",
+    ),
+    "a density of nothing": (lambda fluid: Density(fluid.device, np.ones((0, 20))), "shape"),
+    "a fluid laid on another picture": (lambda fluid: fluid.lay_on(Grid(20, 12, (1.0, 0.7))), "cannot be laid"),
+    "a velocity of the paper's map that is too large": (
+        lambda fluid: PaperWarpMap(fluid.device, fluid.grid).advance_prescribed(np.full((12, 20, 2), 3e38), 1e4),
+        "beyond",
     ),
     "an endless growth": (lambda fluid: Brush(fluid.device).expand(fluid, Tip((0, 0), (0, 0), 0.1), np.inf), "rate"),
 }
@@ -400,7 +428,7 @@ def test_forces_as_fields_arrays_and_functions_do_the_same(device: Device) -> No
     (ux, uy), (vx, vy) = grid.u_faces(), grid.v_faces()
     array = np.stack([push(ux, uy, 0.05)[0], push(vx, vy, 0.05)[1]], axis=-1)
     field = device.upload(array.astype(np.float32))
-    for forces in (push, array, [array], [(field, 0.1)], [0.5 * array, (field, 0.05)]):
+    for forces in (push, array, [array], (field, 0.1), [(field, 0.1)], [0.5 * array, (field, 0.05)]):
         fluid = Fluid(device, grid)
         fluid.step(0.1, forces)
         found.append(fluid.u)
@@ -457,6 +485,7 @@ def test_what_is_of_no_use_is_told_in_a_sentence(device: Device, kind: type[Flui
         lambda wrong: Brush(device).push(fluid, wrong, 0.1),
         lambda wrong: Brush(device).lead(fluid, wrong),
         lambda wrong: Brush(device).make_up(fluid, Push(Tip((0.3, 0.3), (0.3, 0.3), 0.1), 0.1), wrong),
+        lambda wrong: Push(Tip((0.3, 0.3), (0.3, 0.3), 0.1), 0.1, local=wrong),
         lambda wrong: Tip((0.3, 0.3), (0.3, 0.3), wrong),
         lambda wrong: Tip((0.3, 0.3), (0.3, 0.3), 0.1, others=(wrong,)),
         lambda wrong: Handle(wrong),
@@ -492,6 +521,33 @@ def test_what_is_of_no_use_is_told_in_a_sentence(device: Device, kind: type[Flui
     assert np.array_equal(fluid.velocity_at_centres(), still)
     for item in (fluid, warp, own):
         item.release()
+
+
+def test_a_function_may_work_in_place_and_give_the_same_arrays_again(device: Device) -> None:
+    """Its first component is taken on left faces, its second on upper ones; a map's path has four places and times."""
+    grid, given = Grid(20, 12), (np.zeros((12, 20)), np.zeros((12, 20)))
+
+    def anew(x: np.ndarray, y: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
+        return np.sin(5 * (x - 0.5)), x * np.cos(4 * y)
+
+    def again(x: np.ndarray, y: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
+        np.multiply(x, np.cos(4 * y), out=given[1])
+        x -= 0.5
+        np.sin(5 * x, out=given[0])
+        return given
+
+    found = []
+    for function in (anew, again):
+        fluid, paper, warp = Fluid(device, grid), PaperFluid(device, grid), WarpMap(device, grid)
+        fluid.set_velocity(function)
+        fluid.add_force(function, 0.1)
+        paper.set_velocity(function)
+        warp.advance_prescribed(function, 0.1)
+        found.append((fluid.u, fluid.v, paper.velocity_at_centres(), warp.read()))
+        for item in (fluid, paper, warp):
+            item.release()
+    for other, wanted in zip(found[1], found[0], strict=True):
+        np.testing.assert_array_equal(other, wanted)
 
 
 def test_arrays_of_any_layout_are_the_same_numbers(device: Device) -> None:
