@@ -7,7 +7,6 @@ import os
 import re
 import sys
 import threading
-import weakref
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
@@ -92,12 +91,11 @@ class Context:
     """
 
     _current: ClassVar[Context | None] = None  # whose context is
-    _alive: ClassVar[weakref.WeakSet[Context]] = weakref.WeakSet()
+    _forks: ClassVar[int] = 0  # that led to this process
 
     def __init__(self, ctx: moderngl.Context, owns_context: bool = False) -> None:
         self.ctx = ctx
-        self._thread = threading.get_ident()  # in which it is current; none of a forked process
-        self._alive.add(self)
+        self._made_in = threading.get_ident(), Context._forks
         self._owns_context = owns_context
         Context._current = self  # as a new one is
         info = ctx.info
@@ -185,7 +183,7 @@ class Context:
         Raises:
             ContextError: if it was released, or made in another thread or process: GL draws nothing there, or hangs.
         """
-        if threading.get_ident() != self._thread:
+        if (threading.get_ident(), Context._forks) != self._made_in:
             raise ContextError("a device works only in the thread and the process that made it; make one in each")
         if Context._current is not self:
             if isinstance(self.ctx.mglo, moderngl.InvalidObject):
@@ -214,9 +212,7 @@ class Context:
 
 
 def _after_fork() -> None:
-    """In a forked process no context works: what draws for it are threads of the process before."""
-    for context in Context._alive:
-        context._thread = 0
+    Context._forks += 1  # the threads that draw for a context have stayed behind
 
 
 if hasattr(os, "register_at_fork"):

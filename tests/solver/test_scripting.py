@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import os
+import multiprocessing
 import re
 import subprocess
 import sys
@@ -389,10 +389,13 @@ def test_a_saved_moment_is_a_copy_and_comes_back(device: Device, kind: type[Flui
         with pytest.raises(ValueError, match="of no time"):
             fluid.restore(timeless)
         timeless.release()
-    with pytest.raises(ValueError, match="another grid"):
-        other.restore(state)
+    elsewhere = kind(device, Grid(24, 16, (0.5, 1 / 3), (0.1, 0.1), (1.0, 2 / 3)))  # as many cells, of half the size
+    for wrong in (other, elsewhere):
+        with pytest.raises(ValueError, match="another grid"):
+            wrong.restore(state)
+        assert not wrong.u.any()
+        wrong.release()
     state.release()
-    other.release()
     fluid.release()
 
 
@@ -518,6 +521,9 @@ def test_what_is_of_no_use_is_told_in_a_sentence(device: Device, kind: type[Flui
         for wrong in (nothing, cast(Any, "x")):
             with pytest.raises((TypeError, ValueError), match=r"wanted|must be"):
                 call(wrong)
+    for wrong in (nothing, cast(Any, Walls())):
+        with pytest.raises(TypeError, match=r"how a step is made is .*wanted"):
+            fluid.params = wrong
     assert np.array_equal(fluid.velocity_at_centres(), still)
     for item in (fluid, warp, own):
         item.release()
@@ -614,11 +620,11 @@ def test_a_device_works_in_its_own_thread_and_process_only(fluid: Fluid) -> None
 
     with ThreadPoolExecutor(1) as pool:
         assert pool.submit(is_refused).result()
-    if hasattr(os, "fork"):
-        child = os.fork()
-        if not child:
-            os._exit(0 if is_refused() else 1)
-        assert os.waitpid(child, 0)[1] == 0
+    if "fork" in multiprocessing.get_all_start_methods():
+        child = multiprocessing.get_context("fork").Process(target=lambda: sys.exit(not is_refused()))
+        child.start()
+        child.join()
+        assert child.exitcode == 0
     assert fluid.time == time
     np.testing.assert_array_equal(fluid.u, before)
     fluid.step(0.1)
@@ -641,6 +647,7 @@ def test_what_was_released_says_so(device: Device) -> None:
     for call in calls:
         with pytest.raises(FieldError, match="was released"):
             call()
+    assert re.fullmatch(r"Fluid\(20 x 12 cells, t = 0 s, .* was released\)", repr(fluid))
 
 
 def test_what_float32_cannot_hold_is_refused_in_a_sentence(device: Device):
