@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +17,7 @@ Vector = np.ndarray | Function
 
 # A force, lengths / s^2: a vector, or a field on faces with its time law integrated over the step, seconds.
 Force = Vector | tuple[Field, float]
-Forces = Vector | Iterable[Force]
+Forces = Force | Iterable[Force]
 # Those in a step: fields with their impulses, and the velocity that all others add, if there are any.
 Impulses = tuple[list[tuple[Field, float]], np.ndarray | None]
 
@@ -51,15 +52,16 @@ def components(what: str, function: Function, x: np.ndarray, y: np.ndarray, time
         ValueError: if it gives something else, or a value that is not finite.
     """
     check_type("a time", time)
-    parts = function(x, y, time)
-    if not isinstance(parts, Sequence | np.ndarray) or len(parts) != 2:
-        count = len(parts) if isinstance(parts, Sequence | np.ndarray) else 1
+    # It may work in place, and give the same arrays at every call.
+    parts = function(x.copy(), y.copy(), time)
+    count = len(parts) if isinstance(parts, Sequence) or (isinstance(parts, np.ndarray) and parts.ndim) else 1
+    if count != 2:
         raise ValueError(f"{what} has two components, and the function gave {count}")
     arrays = tuple(real_array(what, part) for part in parts)
     if not all(np.isfinite(array).all() for array in arrays):
         raise ValueError(f"{what} holds a value that is not finite")
     try:
-        return tuple(np.broadcast_to(array, x.shape) for array in arrays)
+        return tuple(np.broadcast_to(array, x.shape).copy() for array in arrays)
     except ValueError:
         shapes = " and ".join(str(array.shape) for array in arrays)
         raise ValueError(f"{what} of shape {shapes} was given, {x.shape} is wanted") from None
@@ -90,8 +92,11 @@ def impulses(forces: Forces, grid: Grid, time: float, dt: float) -> Impulses:
         TypeError: for what is no force.
     """
     fields, total = list[tuple[Field, float]](), None
-    several = [forces] if isinstance(forces, np.ndarray) or callable(forces) else forces
-    check_type("what forces the fluid", several, Iterable)
+    is_one = isinstance(forces, np.ndarray | Field) or callable(forces)
+    is_one = is_one or (isinstance(forces, tuple) and isinstance(next(iter(forces), None), Field))
+    several: Any = [forces] if is_one else forces
+    if not isinstance(several, Iterable):
+        raise TypeError(f"a force is {several!r:.80}, an array or a function is wanted, or several of them")
     for force in several:
         if isinstance(force, tuple | Field):
             if not (isinstance(force, tuple) and len(force) == 2):

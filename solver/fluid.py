@@ -195,7 +195,7 @@ class Fluid(Scheme):
 
     def strain(self, dt: float) -> float:
         """How much `carrier` bends in `dt` seconds what it carries, dt max |grad w|; waits for the GPU."""
-        return self._trace.strain(self.faces() if self.local.is_empty else self.carrier(), dt, self.grid)
+        return self._trace.strain(self.faces() if self.local.is_empty else self.carrier(), check_step(dt), self.grid)
 
     def begin_trace(self, dt: float) -> Tracing | None:
         """What it takes to draw the trace of `carrier`, for a pass that draws it together with something else.
@@ -243,10 +243,10 @@ class Fluid(Scheme):
         """Go on at rest on another grid with as many cells; viscosity and solid cells have to be set again.
 
         Raises:
-            ValueError: if the numbers of cells differ.
+            ValueError: if the numbers of cells differ, or the pictures.
         """
         check_type("where a fluid is laid", grid, Grid)
-        if grid.size != self.grid.size:
+        if (grid.size, grid.picture) != (self.grid.size, self.grid.picture):
             raise ValueError(f"a fluid of {self.grid} cannot be laid on {grid}")
         self.grid = grid
         self._viscosity_solver.set_spacing(grid.spacing)

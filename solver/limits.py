@@ -28,10 +28,16 @@ def check_type(what: str, value: object, kind: Any = Real) -> None:
 
     Raises:
         TypeError: if it is not.
+        ValueError: for a number that is too large for any float.
     """
     if kind is Real and isinstance(value, float):  # as most are: to ask an abstract class takes ten times as long
         return
-    if not isinstance(value, kind):
+    if kind is Real and isinstance(value, Real):
+        try:
+            float(value)
+        except OverflowError:
+            raise ValueError(f"{what} is larger than any float") from None
+    elif not isinstance(value, kind):
         wanted = " or ".join("number" if one is Real else one.__name__ for one in get_args(kind) or (kind,))
         raise TypeError(f"{what} is {' '.join(repr(value).split()):.80}, a {wanted} is wanted")
 
@@ -66,8 +72,10 @@ def real_array(what: str, values: object) -> np.ndarray:
     """Values as an array.
 
     Raises:
-        ValueError: if they are no real numbers, or rows of them are of unequal length.
+        ValueError: if they are no real numbers, some of them are masked, or rows of them are of unequal length.
     """
+    if np.ma.is_masked(values):
+        raise ValueError(f"{what} is masked in some places; `filled` gives them a value")
     try:
         array = np.asarray(values)
     except ValueError:
@@ -149,7 +157,7 @@ def check_step(dt: float) -> float:
 def check_finite(what: str, value: float) -> None:
     """Make sure that a number is finite, and no larger than `LARGEST_SPEED`."""
     check_type(what, value)
-    if not -LARGEST_SPEED <= value <= LARGEST_SPEED:
+    if not -LARGEST_SPEED <= float(value) <= LARGEST_SPEED:  # in float16 the largest would be infinite
         raise ValueError(f"{what} of {value} was given; it must be finite and no larger than {LARGEST_SPEED:g}")
 
 

@@ -217,6 +217,7 @@ class PaperWarpMap(WarpMap):
         """Carry the map from `time` to `time + dt` by a function (x, y, t) or an array (ny, nx, 2), at cell centres."""
         check_finite("a time", time)
         array = at_centres("a velocity", velocity, self.grid, time + 0.5 * check_step(dt))
+        check_size("a velocity", array)
         field = self.device.upload(array, "prescribed velocity")
         self.advance(field, dt)
         field.release()

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from solver.faces import Forces, Vector, check_field
+from solver.gl.context import ContextError
 from solver.gl.device import Device
-from solver.gl.field import Field
+from solver.gl.field import Field, FieldError
 from solver.grid import Grid
 from solver.limits import as_mask, check_finite, check_type, viscosities
 from solver.params import FluidParams
@@ -90,7 +91,6 @@ class Scheme(ABC):
     def __init__(self, device: Device, grid: Grid, params: FluidParams | None = None) -> None:
         check_type("what a fluid lives in", device, Device)
         check_type("the cells of a fluid", grid, Grid)
-        check_type("how a step is made", params or FluidParams(), FluidParams)
         self.device = device
         self.grid = grid
         self.params = params or FluidParams()
@@ -104,6 +104,16 @@ class Scheme(ABC):
         self.measuring = False
         self.residuals = Residuals()
 
+    @property
+    def params(self) -> FluidParams:
+        """How a step is made; may be replaced between steps."""
+        return self._params
+
+    @params.setter
+    def params(self, params: FluidParams) -> None:
+        check_type("how a step is made", params, FluidParams)
+        self._params = params
+
     # -- the paper's step -------------------------------------------------------------------------------------------
 
     @abstractmethod
@@ -113,7 +123,7 @@ class Scheme(ABC):
         Args:
             dt: seconds, of any size.
             forces: one or several: arrays (ny, nx, 2) on MAC faces, lengths / s^2; functions (x, y, t) that give both
-                components; or fields, each with its time law integrated over the step.
+                components; or pairs of a field on MAC faces and its time law integrated over the step.
             steer: is called with the velocity on MAC faces between diffusion and projection, and adds to it: there
                 brushes make up for what viscosity took.
 
@@ -253,7 +263,7 @@ class Scheme(ABC):
 
     def save(self) -> State:
         """A copy of this moment, on the GPU, which the caller releases."""
-        return State.of(self.device, self._live(), time=self.time)
+        return replace(State.of(self.device, self._live(), time=self.time), grid=self.grid)
 
     def restore(self, state: State) -> None:
         """Go back to a saved moment, exactly; input for the next step is forgotten.
@@ -265,6 +275,8 @@ class Scheme(ABC):
         time = state.values.get("time", np.array(np.nan))
         if time.shape or not np.isfinite(time):
             raise ValueError("the state is of no time")
+        if state.grid != self.grid:
+            raise ValueError(f"the state is of another grid, {state.grid}, than {self.grid}")
         state.write_to(self._live())
         self.time = float(time)
         self.impulse.clear()
@@ -282,9 +294,13 @@ class Scheme(ABC):
             item.release()
 
     def __repr__(self) -> str:
-        motion = self.motion()
+        cells = f"{type(self).__name__}({self.grid.nx} x {self.grid.ny} cells, t = {self.time:.6g} s"
+        try:
+            motion = self.motion()
+        except (FieldError, ContextError) as error:
+            return f"{cells}, {error})"
         return (
-            f"{type(self).__name__}({self.grid.nx} x {self.grid.ny} cells, t = {self.time:.6g} s, "
+            f"{cells}, "
             f"{self.params.walls.slip}-slip walls, energy {motion.kinetic_energy:.4g}, "
             f"fastest {motion.largest_speed:.4g} sides / s)".replace("none-slip", "no-slip")
         )

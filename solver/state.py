@@ -11,6 +11,7 @@ import numpy as np
 from solver.gl.device import Device
 from solver.gl.field import Field
 from solver.gl.tiled import SavedTiles, Tile, TiledField
+from solver.grid import Grid
 
 
 @dataclass(frozen=True)
@@ -21,11 +22,13 @@ class State:
         fields: the textures by name.
         values: everything else, by name.
         tiles: the saved tiles of tiled fields, by name.
+        grid: that it is of, where that is not among the values.
     """
 
     fields: dict[str, Field]
     values: dict[str, np.ndarray] = field(default_factory=dict)
     tiles: dict[str, SavedTiles] = field(default_factory=dict)
+    grid: Grid | None = None
 
     @classmethod
     def of(cls, device: Device, fields: Mapping[str, Field], **values: object) -> Self:
@@ -72,7 +75,7 @@ class State:
             ValueError: if an array is missing or of another size.
         """
         rest, fields, tiles = dict(arrays), dict[str, Field](), dict[str, SavedTiles]()
-        made = State(fields, rest, tiles)
+        made = State(fields, rest, tiles, self.grid)
         try:
             for name, saved in self.fields.items():
                 given, now = rest.pop(name, None), saved.get()

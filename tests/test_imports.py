@@ -53,7 +53,7 @@ SOLVER = {
     "packing": {"gl"},
     "pressure": {"gl", "components", "packing"},
     "viscosity": {"gl", "components", "packing", "params"},
-    "state": {"gl"},
+    "state": {"gl", "grid"},
     "faces": {"gl", "limits", "grid"},
     "scheme": {"gl", "limits", "grid", "params", "state", "faces"},
     "flow": {"gl", "limits", "grid", "params"},

@@ -125,6 +125,7 @@ class Push:
             raise ValueError("a push takes some time")
         for name in ("strength", "slip", "strain_limit"):
             check_finite(f"a push's {name}", getattr(self, name))
+        check_type("the local part of a push", self.local)
         if not 0 <= self.local <= 1:
             raise ValueError("the local part of a push must be from 0 to 1")
         for velocity in self.velocities:

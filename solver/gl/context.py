@@ -6,6 +6,7 @@ import ctypes.util
 import os
 import re
 import sys
+import threading
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
@@ -90,9 +91,11 @@ class Context:
     """
 
     _current: ClassVar[Context | None] = None  # whose context is
+    _forks: ClassVar[int] = 0  # that led to this process
 
     def __init__(self, ctx: moderngl.Context, owns_context: bool = False) -> None:
         self.ctx = ctx
+        self._made_in = threading.get_ident(), Context._forks
         self._owns_context = owns_context
         Context._current = self  # as a new one is
         info = ctx.info
@@ -178,8 +181,10 @@ class Context:
         """Make its context the current one, if another device's was used last; to be called before any drawing.
 
         Raises:
-            ContextError: if it was released.
+            ContextError: if it was released, or made in another thread or process: GL draws nothing there, or hangs.
         """
+        if (threading.get_ident(), Context._forks) != self._made_in:
+            raise ContextError("a device works only in the thread and the process that made it; make one in each")
         if Context._current is not self:
             if isinstance(self.ctx.mglo, moderngl.InvalidObject):
                 raise ContextError("the device was released")
@@ -204,3 +209,11 @@ class Context:
 
     def __exit__(self, *_: object) -> None:
         self.release()
+
+
+def _after_fork() -> None:
+    Context._forks += 1  # the threads that draw for a context have stayed behind
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_after_fork)

@@ -8,7 +8,7 @@ import moderngl
 import numpy as np
 
 from solver.gl.context import Context
-from solver.gl.field import DoubleField, Field, FieldError
+from solver.gl.field import DoubleField, Field, FieldError, numbers_in
 from solver.gl.passes import Pass
 
 # Passes that are kept compiled. Painting with all tools asks for some 200, and a frame for 60. Mesa keeps the code of
@@ -41,9 +41,9 @@ class Device(Context):
         """A field holding `array`, `(h, w)` or `(h, w, c)`; dtype from the array: uint8 -> f1, else f4.
 
         Raises:
-            FieldError: on another shape, or on a value that is no number or not finite.
+            FieldError: on another shape, or on a value that is masked, no number or not finite.
         """
-        array = np.asarray(array)
+        array = numbers_in(label, array)
         if array.ndim not in (2, 3) or (array.ndim == 3 and not 1 <= array.shape[2] <= 4):
             raise FieldError(f"{label}: an array of shape {array.shape} was given, (h, w) or (h, w, 1-4) is wanted")
         kind = dtype or ("f1" if array.dtype == np.uint8 else "f4")

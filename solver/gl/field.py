@@ -113,11 +113,9 @@ class Field:
             region: (x, y, width, height) in texels of what is written; by default all.
 
         Raises:
-            FieldError: on another shape, or on a value that is no number or not finite.
+            FieldError: on another shape, or on a value that is masked, no number or not finite.
         """
-        array = np.asarray(array)
-        if array.dtype.kind not in "fiub":
-            raise FieldError(f"{self.label}: an array of {array.dtype} was given, real numbers are wanted")
+        array = numbers_in(self.label, array)
         width, height = region[2:] if region else self.size
         shape = (height, width) if self.components == 1 else (height, width, self.components)
         if array.shape != shape and array.shape != (*shape, 1):
@@ -175,6 +173,19 @@ class Field:
 
     def __repr__(self) -> str:
         return f"Field({self.label}, {self.width} x {self.height} x {self.components} {self.dtype})"
+
+
+def numbers_in(label: str, values: object) -> np.ndarray:
+    """Real numbers as an array. Raises `FieldError` for others, masked ones, and rows of unequal length."""
+    if np.ma.is_masked(values):
+        raise FieldError(f"{label}: the array is masked in some places; `filled` gives them a value")
+    try:
+        array = np.asarray(values)
+    except ValueError:
+        raise FieldError(f"{label}: the array has rows of unequal length") from None
+    if array.dtype.kind not in "fiub":
+        raise FieldError(f"{label}: an array of {array.dtype} was given, real numbers are wanted")
+    return array
 
 
 def new_texture(ctx: moderngl.Context, size: tuple[int, int], components: int, dtype: str) -> moderngl.Texture:

@@ -82,6 +82,9 @@ class Pass:
         """
         fields = (target,) if isinstance(target, Field) else tuple(target)
         device, size = self.device, fields[0].size
+        for field in fields:
+            if field.device is not device:
+                raise FieldError(f"{field} is another device's")
         if device.watch is not None:
             device.watch()
         regions = [(0, 0, *size)] if region is None else _clipped(region, size)

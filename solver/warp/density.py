@@ -32,11 +32,11 @@ class Density:
     ) -> None:
         self.device = device
         check_type("a diffusion", kappa)
-        if not 0 <= kappa <= LARGEST_VISCOSITY:
+        if not 0 <= float(kappa) <= LARGEST_VISCOSITY:
             raise ValueError(f"a diffusion of {kappa} was asked for; it must be from 0 to {LARGEST_VISCOSITY:g}")
         self.kappa = kappa
         self._shape = real_array("a density", values).shape
-        if not (len(self._shape) == 2 or (len(self._shape) == 3 and 1 <= self._shape[2] <= 4)):
+        if 0 in self._shape or not (len(self._shape) == 2 or (len(self._shape) == 3 and self._shape[2] <= 4)):
             raise ValueError(f"a density of shape {self._shape} was given, (h, w) or (h, w, 1-4) is wanted")
         start = self._padded("a density", values)
         added = None if source is None else self._padded("a source of density", source)

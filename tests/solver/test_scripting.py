@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import re
 import subprocess
 import sys
 import warnings
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, cast
 
@@ -24,6 +26,7 @@ from solver import (
     Handles,
     Masks,
     PaperFluid,
+    PaperWarpMap,
     Tip,
     Walls,
     WarpMap,
@@ -67,6 +70,11 @@ def fluid(device: Device) -> Any:
     fluid.project()
     yield fluid
     fluid.release()
+
+
+def float16(number: float) -> Any:
+    """In which the largest number that is accepted is infinite."""
+    return np.float16(number)
 
 
 WRONG: dict[str, tuple[Callable[[Any], object], str]] = {
@@ -201,6 +209,28 @@ WRONG: dict[str, tuple[Callable[[Any], object], str]] = {
             WarpMap(fluid.device, fluid.grid).follow(fluid, 0.1),
         ),
         "too fast",
+    ),
+    "an endless drag in 16 bits": (lambda fluid: FluidParams(drag=float16(np.inf)), "drag"),
+    "an endless diffusion in 16 bits": (
+        lambda fluid: Density(fluid.device, np.ones((12, 20)), float16(np.inf)),
+        "diffusion",
+    ),
+    "a grid beyond any float": (lambda fluid: Grid.for_picture(10**400, 16, 64), "larger than any float"),
+    "a brush beyond any float": (lambda fluid: Tip((0, 0), (0, 0), 0.1, 10**400), "larger than any float"),
+    "a negative strain": (lambda fluid: fluid.strain(-0.1), "step"),
+    "a velocity with holes": (lambda fluid: fluid.set_velocity(np.ma.masked_less(np.zeros((12, 20, 2)), 1)), "masked"),
+    "viscosity with holes": (lambda fluid: fluid.set_viscosity(np.ma.masked_less(np.zeros((12, 20)), 1)), "masked"),
+    "frozen places with holes": (lambda fluid: fluid.device.upload(np.ma.masked_less(np.zeros((3, 4)), 1)), "masked"),
+    "ragged rows": (lambda fluid: fluid.device.upload(cast(Any, [[1, 2], [3]])), "unequal length"),
+    "a force of a number as an array": (
+        lambda fluid: fluid.step(0.1, lambda x, y, t: cast(Any, np.array(3.0))),
+        "gave 1",
+    ),
+    "a density of nothing": (lambda fluid: Density(fluid.device, np.ones((0, 20))), "shape"),
+    "a fluid laid on another picture": (lambda fluid: fluid.lay_on(Grid(20, 12, (1.0, 0.7))), "cannot be laid"),
+    "a velocity of the paper's map that is too large": (
+        lambda fluid: PaperWarpMap(fluid.device, fluid.grid).advance_prescribed(np.full((12, 20, 2), 3e38), 1e4),
+        "beyond",
     ),
     "an endless growth": (lambda fluid: Brush(fluid.device).expand(fluid, Tip((0, 0), (0, 0), 0.1), np.inf), "rate"),
 }
@@ -359,10 +389,13 @@ def test_a_saved_moment_is_a_copy_and_comes_back(device: Device, kind: type[Flui
         with pytest.raises(ValueError, match="of no time"):
             fluid.restore(timeless)
         timeless.release()
-    with pytest.raises(ValueError, match="another grid"):
-        other.restore(state)
+    elsewhere = kind(device, Grid(24, 16, (0.5, 1 / 3), (0.1, 0.1), (1.0, 2 / 3)))  # as many cells, of half the size
+    for wrong in (other, elsewhere):
+        with pytest.raises(ValueError, match="another grid"):
+            wrong.restore(state)
+        assert not wrong.u.any()
+        wrong.release()
     state.release()
-    other.release()
     fluid.release()
 
 
@@ -398,7 +431,7 @@ def test_forces_as_fields_arrays_and_functions_do_the_same(device: Device) -> No
     (ux, uy), (vx, vy) = grid.u_faces(), grid.v_faces()
     array = np.stack([push(ux, uy, 0.05)[0], push(vx, vy, 0.05)[1]], axis=-1)
     field = device.upload(array.astype(np.float32))
-    for forces in (push, array, [array], [(field, 0.1)], [0.5 * array, (field, 0.05)]):
+    for forces in (push, array, [array], (field, 0.1), [(field, 0.1)], [0.5 * array, (field, 0.05)]):
         fluid = Fluid(device, grid)
         fluid.step(0.1, forces)
         found.append(fluid.u)
@@ -455,6 +488,7 @@ def test_what_is_of_no_use_is_told_in_a_sentence(device: Device, kind: type[Flui
         lambda wrong: Brush(device).push(fluid, wrong, 0.1),
         lambda wrong: Brush(device).lead(fluid, wrong),
         lambda wrong: Brush(device).make_up(fluid, Push(Tip((0.3, 0.3), (0.3, 0.3), 0.1), 0.1), wrong),
+        lambda wrong: Push(Tip((0.3, 0.3), (0.3, 0.3), 0.1), 0.1, local=wrong),
         lambda wrong: Tip((0.3, 0.3), (0.3, 0.3), wrong),
         lambda wrong: Tip((0.3, 0.3), (0.3, 0.3), 0.1, others=(wrong,)),
         lambda wrong: Handle(wrong),
@@ -487,9 +521,39 @@ def test_what_is_of_no_use_is_told_in_a_sentence(device: Device, kind: type[Flui
         for wrong in (nothing, cast(Any, "x")):
             with pytest.raises((TypeError, ValueError), match=r"wanted|must be"):
                 call(wrong)
+    for wrong in (nothing, cast(Any, Walls())):
+        with pytest.raises(TypeError, match=r"how a step is made is .*wanted"):
+            fluid.params = wrong
     assert np.array_equal(fluid.velocity_at_centres(), still)
     for item in (fluid, warp, own):
         item.release()
+
+
+def test_a_function_may_work_in_place_and_give_the_same_arrays_again(device: Device) -> None:
+    """Its first component is taken on left faces, its second on upper ones; a map's path has four places and times."""
+    grid, given = Grid(20, 12), (np.zeros((12, 20)), np.zeros((12, 20)))
+
+    def anew(x: np.ndarray, y: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
+        return np.sin(5 * (x - 0.5)), x * np.cos(4 * y)
+
+    def again(x: np.ndarray, y: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
+        np.multiply(x, np.cos(4 * y), out=given[1])
+        x -= 0.5
+        np.sin(5 * x, out=given[0])
+        return given
+
+    found = []
+    for function in (anew, again):
+        fluid, paper, warp = Fluid(device, grid), PaperFluid(device, grid), WarpMap(device, grid)
+        fluid.set_velocity(function)
+        fluid.add_force(function, 0.1)
+        paper.set_velocity(function)
+        warp.advance_prescribed(function, 0.1)
+        found.append((fluid.u, fluid.v, paper.velocity_at_centres(), warp.read()))
+        for item in (fluid, paper, warp):
+            item.release()
+    for other, wanted in zip(found[1], found[0], strict=True):
+        np.testing.assert_array_equal(other, wanted)
 
 
 def test_arrays_of_any_layout_are_the_same_numbers(device: Device) -> None:
@@ -530,12 +594,41 @@ def test_devices_beside_each_other_do_not_mix(device: Device) -> None:
                 here.step(0.1, forces)
             np.testing.assert_array_equal(here.u, wanted)
             assert here.impulse.is_empty
+        with pytest.raises(FieldError, match="another device"):  # it would be drawn into some texture of this one
+            Brush(device).expand(there, Tip((0.3, 0.3), (0.3, 0.3), 0.1), 1.0)
+        steered = Brush(device), Push(Tip((0.3, 0.3), (0.4, 0.3), 0.1), 0.1)
+        with pytest.raises(FieldError, match="another device"):
+            there.step(0.1, (), lambda faces: steered[0].make_up(there, steered[1], faces))
     here.step(0.1)
     assert np.isfinite(here.u).all()
     with pytest.raises(ContextError, match="released"):
         there.step(0.1)
     here.release()
     alone.release()
+
+
+def test_a_device_works_in_its_own_thread_and_process_only(fluid: Fluid) -> None:
+    """In another thread GL would draw nothing, in a forked process it would wait for ever."""
+    before, time = fluid.u, fluid.time
+
+    def is_refused() -> bool:
+        try:
+            fluid.step(0.1)
+        except ContextError as error:
+            return "thread and the process" in str(error)
+        return False
+
+    with ThreadPoolExecutor(1) as pool:
+        assert pool.submit(is_refused).result()
+    if "fork" in multiprocessing.get_all_start_methods():
+        child = multiprocessing.get_context("fork").Process(target=lambda: sys.exit(not is_refused()))
+        child.start()
+        child.join()
+        assert child.exitcode == 0
+    assert fluid.time == time
+    np.testing.assert_array_equal(fluid.u, before)
+    fluid.step(0.1)
+    assert not np.array_equal(fluid.u, before)
 
 
 def test_what_was_released_says_so(device: Device) -> None:
@@ -554,6 +647,7 @@ def test_what_was_released_says_so(device: Device) -> None:
     for call in calls:
         with pytest.raises(FieldError, match="was released"):
             call()
+    assert re.fullmatch(r"Fluid\(20 x 12 cells, t = 0 s, .* was released\)", repr(fluid))
 
 
 def test_what_float32_cannot_hold_is_refused_in_a_sentence(device: Device):
