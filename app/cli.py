@@ -155,6 +155,11 @@ def _tell(*lines: str) -> None:
         print(f"fluidwarp: {shown(line)}", file=sys.stderr)
 
 
+def flag(name: str, says: str) -> Any:
+    """An option that takes no value, and shows none in the help."""
+    return typer.Option(name, metavar="", help=says)
+
+
 Output = Annotated[
     Path, typer.Option("--output", "-o", metavar="OUT", help="File to write; its extension sets the format.")
 ]
@@ -163,7 +168,7 @@ Output = Annotated[
 @cli.callback(invoke_without_command=True)
 def start(
     context: typer.Context,
-    version: Annotated[bool, typer.Option("--version", help="Show the version and exit.")] = False,
+    version: Annotated[bool, flag("--version", "Show the version and exit.")] = False,
 ) -> None:
     """Without a command, opens the editor; with a picture, a clip, a recipe or a project alone, on that."""
     if version:
@@ -205,7 +210,7 @@ Frames = Annotated[
     str | None,
     typer.Option(metavar="A-B", help="Only these frames of an animation, from 0; of numbered files, by their numbers."),
 ]
-Resume = Annotated[bool, typer.Option("--resume", help="Skip files of a sequence that are already up to date.")]
+Resume = Annotated[bool, flag("--resume", "Skip files of a sequence that are already up to date.")]
 Jobs = Annotated[int, typer.Option("--jobs", "-j", min=1, help="Number of processes, for several pictures.")]
 Cluster = Annotated[
     str | None,
@@ -215,7 +220,7 @@ Dpi = Annotated[
     float | None,
     typer.Option(min=1, max=10_000, help="Dots per inch to note in a picture for print. Default: its own."),
 ]
-Strip = Annotated[bool, typer.Option("--strip", help="Leave out metadata, but not the colour profile.")]
+Strip = Annotated[bool, flag("--strip", "Leave out metadata, but not the colour profile.")]
 Codec = Annotated[
     str | None,
     typer.Option(help="Another codec: h265 in .mp4, av1 in .webm, prores-422-hq in .mov; piz, dwaa ... in .exr."),
@@ -266,16 +271,17 @@ def render(
         ),
     ] = None,
     forward: Annotated[
-        bool,
-        typer.Option("--forward", help="Map says where points of the original go, not where they come from."),
+        bool, flag("--forward", "Map says where points of the original go, not where they come from.")
     ] = False,
-    offsets: Annotated[bool, typer.Option("--offsets", help="Pixel offsets in the map, instead of an ST map.")] = False,
+    offsets: Annotated[bool, flag("--offsets", "Pixel offsets in the map, instead of an ST map.")] = False,
     overscan: Annotated[int, typer.Option(min=0, help="Pixels to add to the map on each side of the picture.")] = 0,
     map_size: Annotated[int | None, typer.Option(min=6, help="Longer side of the map, in pixels.")] = None,
     size: Size = None,
     filter_: Filter = None,
     grid: Annotated[int | None, typer.Option(help="Cells of the simulation along the longer side.")] = None,
-    solver: Annotated[str | None, typer.Option(help="Simulate by mac, or by paper: the scheme of the paper.")] = None,
+    solver: Annotated[
+        str | None, typer.Option(help="How to simulate: mac (usual), or paper (the paper's own scheme).")
+    ] = None,
     duration: Annotated[float | None, typer.Option(help="Seconds to simulate.")] = None,
     amount: Annotated[float | None, typer.Option(help="Part of the warp to apply, 0 to 1.5; 1 is all of it.")] = None,
     fps: Annotated[
@@ -290,7 +296,7 @@ def render(
         Path | None,
         typer.Option(metavar="DIR", help="Folder to save states of the simulation in; later parts start from them."),
     ] = None,
-    animated: Annotated[bool, typer.Option("--animated", help="Write OUT.webp as an animation, not a still.")] = False,
+    animated: Annotated[bool, flag("--animated", "Write OUT.webp as an animation, not a still.")] = False,
     codec: Codec = None,
     bits: Bits = None,
     dpi: Dpi = None,
@@ -477,15 +483,14 @@ def fit(
     image: Annotated[
         Path | None, typer.Option("--image", "-i", help="Picture to use instead of the recipe's.", readable=False)
     ] = None,
-    evaluations: Annotated[
-        int, typer.Option(min=1, max=100_000, help="At most so many trial runs on a coarse grid.")
-    ] = 32,
+    evaluations: Annotated[int, typer.Option(min=1, max=100_000, help="The most trial runs on a coarse grid.")] = 32,
     local: Annotated[
         float | None,
         typer.Option(
             min=0,
             max=1,
-            help="0: handles push as a fluid; 1: they move only what is under them, the default for curves.",
+            help="0: handles push as a fluid does (default for points); 1: they move only what is under them "
+            "(default for curves).",
         ),
     ] = None,
     time_limit: Annotated[
@@ -497,7 +502,7 @@ def fit(
     """Find handles that bring points to given places, with the least work and without a fold.
 
     Ctrl+C stops and writes the best result so far. FITTED.toml is a recipe: `fluidwarp render FITTED.toml` plays it.
-    Pairs that are missed are told, and by how far; the status is then 0, as of a render whose handles stay away.
+    Pairs that miss their places are named, with the distance left; the exit status is 0 all the same.
     """
     from time import monotonic
 
@@ -609,10 +614,9 @@ def convert(
         ),
     ],
     output: Output,
-    offsets: Annotated[bool, typer.Option("--offsets", help="Pixel offsets in OUT, instead of an ST map.")] = False,
+    offsets: Annotated[bool, flag("--offsets", "Pixel offsets in OUT, instead of an ST map.")] = False,
     invert: Annotated[
-        bool,
-        typer.Option("--invert", help="Invert the map: where points go, instead of where they come from."),
+        bool, flag("--invert", "Invert the map: where points go, instead of where they come from.")
     ] = False,
     kind: MapKind = None,
     grid: StGrid = None,
@@ -638,8 +642,7 @@ def gallery(
         "gallery"
     ),
     strokes: Annotated[
-        bool,
-        typer.Option("--strokes", help="Render the retouching jobs and posters instead, painted with brush strokes."),
+        bool, flag("--strokes", "Render the retouching jobs and posters instead, painted with brush strokes.")
     ] = False,
     gpu: Gpu = None,
 ) -> None:

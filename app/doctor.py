@@ -77,7 +77,7 @@ def _headless() -> Iterator[Finding]:
         f"{found['max_draw_buffers']} draw buffers, {found['max_texture_units']} texture units",
     )
     if found["is_software"]:
-        yield Finding("speed", "a software rasteriser: everything works, at the speed of the processor")
+        yield Finding("speed", "no GPU is used: everything works, at the speed of the processor")
     yield from devices()
 
 

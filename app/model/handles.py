@@ -265,7 +265,7 @@ def labelled(handles: Sequence[RecipeHandle], pins: Sequence[RecipePin]) -> list
 def in_words(said: str) -> str:
     """What messages say, in the window: handle 1 "smile" for handle[1] "smile", pixels alone, Size for radius."""
     said = re.sub(r"\b(handle|pin)\[(\d+)\]", r"\1 \2", re.sub(r" \([\d.e-]+ longer sides\)", "", said))
-    return said.replace("reach (radius)", "Size").replace("fluidwarp fit leads", "Fit leads")
+    return said.replace("reach (radius)", "Size").replace("fluidwarp fit moves", "Fit moves")
 
 
 def heading(said: str) -> str:
@@ -295,7 +295,7 @@ def objections(
             yield f"{way.label} takes hold of nothing: {_shown(way.led.corners[0])} is outside the picture"
             continue
         if outside.any():
-            yield f"{way.label} reaches out of the picture: what is outside is not led"
+            yield f"{way.label} reaches out of the picture: what is outside is not moved"
         if not (ends := way.after[beyond & ~outside]).size and (short := way.short_of_edges(extent)) > ARRIVED:
             more = "what is at the picture's edge stays there"
             yield f"{way.label} stays {100 * short:.3g}% of the longer side short: {more}"
@@ -305,7 +305,7 @@ def objections(
             more = f"of {way.far:.3g} to its goal; give it a larger reach (radius)"
             yield f"{way.label} goes only {LARGEST_LEAD:g} times as far as it reaches, {more}"
         if way.led.closed and _area(way.before) * _area(way.after) < 0:
-            yield f"{way.label} is led inside out"
+            yield f"{way.label} is turned inside out by its goals"
     for one, other in combinations([way for way in led if way.led.takes_hold], 2):
         if max(one.led.start, other.led.start) < min(one.until, other.until):
             near = min(one.reach, other.reach)
@@ -317,11 +317,11 @@ def objections(
             stretched = np.where(apart & (far < near), far_after / np.maximum(far, 1e-30), 0.0).max()
             both, close = f"{one.label} and {other.label}", np.minimum(far, near)
             if (~apart & (_lengths(after - before) > SAME * near)).any():
-                yield f"{both} hold the same place and are led apart"
+                yield f"{both} hold the same place but have different goals"
             elif stretched > MOST_STRETCH:
-                yield f"{both} are led {stretched:.3g} times as far apart as they lie"
+                yield f"{both} have goals {stretched:.3g} times as far apart as they are"
             elif (apart & (far_after * MOST_STRETCH < close)).any():
-                yield f"{both} are led to nearly the same place"
+                yield f"{both} have nearly the same goal"
             elif (apart & (_nearest(before, after) * MOST_STRETCH < close)).any():
                 yield f"{both} cross each other's way"
 

@@ -1,4 +1,7 @@
-"""Drawing the picture through its warp, with what is laid over it."""
+"""Drawing the picture through its warp, with what is laid over it.
+
+Long, as all of it shares what was drawn last: what has not changed is not drawn again.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The editor: one frame is a function of its state, the events since the last one, and the time passed."""
+"""The editor: one frame is a function of its state, the events since the last one, and the time passed.
+
+Long, as it makes all parts of the window, and says in which order they hear, act and are drawn.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Opening and saving what is worked on."""
+"""Opening and saving what is worked on.
+
+One long class: whatever is opened goes the same way, from the question about unsaved work to what is shown.
+"""
 
 from __future__ import annotations
 

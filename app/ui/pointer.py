@@ -1,4 +1,7 @@
-"""The pointer on the canvas: what it does to the picture, the view, the brush and the split."""
+"""The pointer on the canvas: what it does to the picture, the view, the brush and the split.
+
+One class: what a press begins, moves go on with and a release ends.
+"""
 
 from __future__ import annotations
 

@@ -210,7 +210,7 @@ class _Applying:
         return picture.with_wide(found, layers)
 
     def _look_up(self, given: Displacement, size: tuple[int, int], pixels: np.ndarray, quality: Quality) -> np.ndarray:
-        """The pixels of layers; see `along`."""
+        """The pixels of layers; see `resample_layers`."""
         how = replace(self.sampler.how, quality=quality, premultiplied=False)
         return self._sampled(given, pixels, Target(size, how, lambda rows: self.progress.check()))
 

@@ -433,7 +433,7 @@ class _Export:
             warp.release()
 
     def _look_up(self, warp: Map, size: tuple[int, int], pixels: np.ndarray, quality: Quality) -> np.ndarray:
-        """The pixels of layers; see `along`."""
+        """The pixels of layers; see `resample_layers`."""
         target = Target(size, replace(self._how, quality=quality), lambda rows: self.progress.check())
         return looked_up(self.sampler, warp, pixels, target)
 

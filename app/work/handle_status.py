@@ -17,23 +17,23 @@ from solver.warp.inverse import ForwardMap
 Line = tuple[Point, ...]
 FROZEN = "what it holds is frozen"
 HALTED = {  # why a handle or a pin is not where it is led, by `Handles.halts`
-    "strain": "the picture around it is bent as far as it bears",
-    "frozen": "the picture between it and what is frozen is bent as far as it bears",
-    "at odds": "what others hold is in its way",
-    "soft": "it gives way to the fluid, and wants more stiffness",
+    "strain": "the picture around it cannot bend further",
+    "frozen": "the picture between it and what is frozen cannot bend further",
+    "at odds": "another handle or pin is in its way",
+    "soft": "it gives way to the fluid, and needs more stiffness",
     "alone": "the fluid brings it no nearer",
     "edge": "what is at the picture's edge stays there",
     "outside": "it is outside the picture",
     "waiting": "it has not begun",
     "over": "it has let go by now",
-    "under way": "its way is not over yet",
+    "under way": "its movement is not over yet",
     "late": "it is still on its way",
     None: "that is less than a pixel",
 }
 FAR = "its reach (radius) is too small to go that far"
 SMALL = "it reaches over only {:.2g} cells of the simulation; give it a larger reach (radius)"
 FIT = "Fit"  # what the history calls an edit by a fit
-ANEW = "fluidwarp fit leads all handles anew, which may bring them nearer"
+ANEW = "fluidwarp fit moves all handles together, which may bring them nearer"
 HELPED = ("strain", "frozen", "at odds", "soft", "alone")  # where it may
 
 
@@ -160,7 +160,7 @@ def unmet(replay: Replay, within: float, is_fitted: bool = False) -> Iterator[Un
             elif helped and halt in ("strain", "alone") and not is_wide:
                 why, helped = SMALL.format(cells), False
             pixels = far * max(replay.pictures.source.width, replay.pictures.source.height)
-            said = f"{label} is {pixels:.3g} pixels ({far:.3g} longer sides) away from where it is led: {why}"
+            said = f"{label} is {pixels:.3g} pixels ({far:.3g} longer sides) from where it should be: {why}"
             yield Unmet(label, said, helped)
 
 

@@ -2,7 +2,7 @@
 
 A document is worked on live by four layers, each of which knows only those below it: `Recording` is this, `Painting`
 turns gestures into strokes, `Editing` changes the recipe, `Playing` lets time go on. `Session` is all of it. No layer
-knows a window, and the clock comes in from outside, as ticks.
+knows a window, and the clock comes in from outside, as ticks. This one is long, as it holds what the others share.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""A handle or a pin: what of the picture shall be where at which time."""
+"""A handle or a pin: what of the picture shall be where at which time.
+
+Long, as a handle and its shape share what is found out here about lines and outlines.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Masks on a canvas of their own: how thick the fluid is and where it is frozen, painted as finely as the picture."""
+"""Masks on a canvas of their own: how thick the fluid is and where it is frozen, painted as finely as the picture.
+
+One long class: both masks share the canvas, and reach the fluid together, cell by cell where either has changed.
+"""
 
 from __future__ import annotations
 

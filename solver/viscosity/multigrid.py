@@ -1,4 +1,7 @@
-"""Multigrid cycles for the viscous operator: Chebyshev-Jacobi smoothing, transposed transfers, a direct solve."""
+"""Multigrid cycles for the viscous operator: Chebyshev-Jacobi smoothing, transposed transfers, a direct solve.
+
+One long class: a cycle goes through all levels, and its parts read best together.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The accumulated map: all motion up to the last remap, as fine as the picture."""
+"""The accumulated map: all motion up to the last remap, as fine as the picture.
+
+One long class: whatever moves, saves or undoes the map does so in the open one and in all that are closed.
+"""
 
 from __future__ import annotations
 

@@ -207,7 +207,7 @@ def work(robot: Robot, places: object) -> Iterator[str]:
         editor.exports.start(job)
         yield "an export as well"
     editor.messages.caution(
-        "Handle 1 is 69.5 pixels away from where it is led: the picture is bent as far as it bears."
+        "Handle 1 is 69.5 pixels from where it should be: the picture around it cannot bend further."
     )
     yield "a message as well"
     editor.fits.give_up()

@@ -267,7 +267,7 @@ def test_what_cannot_be_met_is_told_as_the_command_line_tells_it_until_it_is_men
     robot.rest()
     said = [*session.objections, *(each.said for each in session.unmet.values())]
     assert said[0] == 'handle[1] and handle[2] "Nose" cross each other\'s way'
-    assert said[-1].endswith("away from where it is led: what it holds is frozen")
+    assert said[-1].endswith("from where it should be: what it holds is frozen")
     told = " ".join(message.text for message in robot.editor.messages.shown)
     assert 'Handle 1 and handle 2 "Nose" cross each other\'s way.' in told
     assert list(session.unmet) == [held.label for held in session.held if held.is_away]

@@ -268,7 +268,7 @@ def test_why_a_line_stays_short_beside_the_edge_is_told(device: Device):
     replay = replay_of(device, handle=[line], fluid={"grid": 16}, duration=0.1)
     replay.seek(4)
     ((_, said, _),) = unmet(replay, ARRIVED)
-    assert said.endswith("away from where it is led: what is at the picture's edge stays there")
+    assert said.endswith("from where it should be: what is at the picture's edge stays there")
     replay.release()
 
 
@@ -280,13 +280,13 @@ def test_that_the_map_bears_no_more_is_told_and_what_may_mend_it(device: Device)
     replay.advance()
     for is_fitted in (False, True):
         ((_, said, helped),) = unmet(replay, ARRIVED, is_fitted)
-        assert said.endswith("bent as far as it bears")
+        assert said.endswith("cannot bend further")
         assert helped != is_fitted
     replay.release()
 
 
 @pytest.mark.parametrize(
-    ("det", "said"), [(0.88, "its way is not over yet"), (0.82, "the picture around it is bent as far as it bears")]
+    ("det", "said"), [(0.88, "its movement is not over yet"), (0.82, "the picture around it cannot bend further")]
 )
 def test_a_map_that_only_slows_a_handle_down_does_not_keep_it_from_its_goal(device: Device, det: float, said: str):
     """Bent so that it goes .74 as fast, and .07 as fast."""
@@ -388,8 +388,8 @@ def test_what_is_frozen_beside_a_handle_is_told(device: Device):
         replay.warp.set(folded)
         replay.advance()
         ((_, said, _),) = unmet(replay, ARRIVED)
-        assert ("the picture between it and what is frozen is bent" in said) == between
-        assert "bent as far as it bears" in said
+        assert ("the picture between it and what is frozen" in said) == between
+        assert "cannot bend further" in said
         replay.release()
 
 
@@ -398,7 +398,7 @@ def test_what_lets_go_by_itself_is_not_said_to_be_in_another_s_way(device: Devic
     replay = replay_of(device, handle=[soft], fluid={"grid": 16, "viscosity": 1.0, "drag": 20.0}, duration=0.8)
     replay.seek(48)
     ((_, said, helped),) = unmet(replay, ARRIVED)
-    assert said.endswith("it gives way to the fluid, and wants more stiffness")
+    assert said.endswith("it gives way to the fluid, and needs more stiffness")
     assert helped
 
 
@@ -413,8 +413,8 @@ def test_only_what_a_fit_leads_is_told_of_it(device: Device):
     folded = np.zeros((96, 128, 2), np.float32)
     folded[:, 66, 0] = 1.5 / 128
     replay.warp.set(folded)
-    said = {label: (sentence.partition("is led: ")[2], helped) for label, sentence, helped in unmet(replay, -1.0)}
-    bent = "the picture around it is bent as far as it bears"
+    said = {label: (sentence.partition("should be: ")[2], helped) for label, sentence, helped in unmet(replay, -1.0)}
+    bent = "the picture around it cannot bend further"
     over, waiting = "it has let go by now", "it has not begun"
     assert said == {
         "handle[1]": (bent, True),
@@ -439,8 +439,8 @@ def test_what_has_let_go_is_asked_for_nothing_unless_its_way_was_not_over(device
     [
         (0.1, 3.0, 0.0, "its reach (radius) is too small to go that far", False),
         (0.03, 0.8, 0.0, "it reaches over only 1.9 cells of the simulation; give it a larger reach (radius)", False),
-        (0.03, 1.8, 1.0, "the picture around it is bent as far as it bears", True),
-        (0.2, 1.9, 0.0, "the picture around it is bent as far as it bears", True),
+        (0.03, 1.8, 1.0, "the picture around it cannot bend further", True),
+        (0.2, 1.9, 0.0, "the picture around it cannot bend further", True),
     ],
     ids=["too far", "small", "small and local", "neither"],
 )
@@ -452,7 +452,7 @@ def test_of_what_is_missed_one_remedy_is_told(
     replay = replay_of(device, handle=[one], duration=3.0)
     replay.seek(180)
     ((_, said, is_helped),) = unmet(replay, ARRIVED)
-    assert (said.partition("is led: ")[2], is_helped) == (why, helped)
+    assert (said.partition("should be: ")[2], is_helped) == (why, helped)
     assert bool([*objections(replay.recipe.handle, (), EXTENT)]) == why.startswith("its reach")
     replay.release()
 
@@ -462,7 +462,7 @@ def test_handles_of_which_none_has_begun_say_so(device: Device):
     replay = replay_of(device, handle=[late], fluid={"grid": 16}, duration=0.1)
     replay.advance()
     ((_, said, _),) = unmet(replay, ARRIVED)
-    assert said.endswith("away from where it is led: it has not begun")
+    assert said.endswith("from where it should be: it has not begun")
     replay.release()
 
 
@@ -851,7 +851,7 @@ def test_what_is_not_reached_is_told_by_number(device: Device):
     ((label, said, _),) = unmet(replay, ARRIVED)
     assert label == 'handle[2] "held"'
     assert said.startswith('handle[2] "held" is ')
-    assert said.endswith("away from where it is led: what it holds is frozen")
+    assert said.endswith("from where it should be: what it holds is frozen")
     assert replay.warp.statistics().folds == 0
     replay.release()
 
@@ -863,7 +863,7 @@ def test_a_line_that_is_led_about_a_place_far_outside_is_told_of(device: Device)
     replay = replay_of(device, handle=[line], freeze=[frozen_disc], duration=0.1)
     replay.seek(4)
     ((_, said, _),) = unmet(replay, ARRIVED)
-    assert said.endswith("away from where it is led: what it holds is frozen")
+    assert said.endswith("from where it should be: what it holds is frozen")
     replay.release()
 
 
@@ -981,13 +981,13 @@ def test_what_cannot_be_met_is_objected_to():
     assert list(objections(recipe.handle, recipe.pin, EXTENT)) == [
         "handle[1] takes hold of nothing: (1.2, 0.5) is outside the picture",
         "handle[2] goes only to the picture's edge: (0.2, -0.5) is outside the picture",
-        "handle[9] reaches out of the picture: what is outside is not led",
+        "handle[9] reaches out of the picture: what is outside is not moved",
         "handle[9] stays 10% of the longer side short: what is at the picture's edge stays there",
-        "handle[10] is led inside out",
-        "handle[2] and handle[9] are led 5.1 times as far apart as they lie",
+        "handle[10] is turned inside out by its goals",
+        "handle[2] and handle[9] have goals 5.1 times as far apart as they are",
         "handle[3] and handle[4] cross each other's way",
-        "handle[5] and handle[6] hold the same place and are led apart",
-        "handle[7] and handle[8] are led 5.65 times as far apart as they lie",
+        "handle[5] and handle[6] hold the same place but have different goals",
+        "handle[7] and handle[8] have goals 5.65 times as far apart as they are",
         "handle[11] and handle[12] cross each other's way",
     ]
 

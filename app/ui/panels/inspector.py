@@ -205,7 +205,7 @@ def _handles(ui: Ui, workspace: Workspace, state: EditorState, do: Do) -> None:
     with ui.enabled(recipe.can_fit):
         if ui.button("Fit##handles", width=-1, height=30):
             do("fit_handles")
-        more = "Finds the reach and the speed of each, which may bring them nearer. May take a minute."
+        more = "Finds a size and a speed for each, which may bring them nearer. May take a minute."
         ui.tooltip("Move all of them together, with the least work", ACTIONS["fit_handles"].key, more, above=True)
     if ui.button("Fit a mask to another ...", width=-1, height=30):
         do("fit_masks")

@@ -89,7 +89,7 @@ def _edge(ui: Ui, rect: Rect, lanes: Lanes) -> None:
     held, hovered = imgui.is_item_active(), imgui.is_item_hovered()
     if held and imgui.get_io().mouse_delta.y:
         lanes.height = min(max((rect.bottom - imgui.get_mouse_pos().y) / ui.scale, LEAST_LANES), TALLEST_LANES)
-    ui.tooltip("The lanes", more="Drag for more of them, or fewer.")
+    ui.tooltip("The lanes", more="Drag to show more or fewer of them.")
     low, high = ImVec2(rect.x, rect.y), ImVec2(rect.right, rect.y + ui.px(2 if held or hovered else 1))
     if held or hovered:
         imgui.get_window_draw_list().add_rect_filled(low, high, packed(ui.palette.accent))

@@ -68,7 +68,7 @@ def _times(ui: Ui, session: Session, which: Which, one: Actor) -> None:
     length = bar.end - bar.start
     slid = ui.slider(
         "bar length", "Duration", length * dt, dt, max(FARTHEST * end, length) * dt, SECONDS,
-        title="How long it lasts", more="The hand goes as much faster, or slower." if which[0] == "stroke" else "",
+        title="How long it lasts", more="The brush moves that much faster, or slower." if which[0] == "stroke" else "",
     )  # fmt: skip
 
     def lasted(one: Actor) -> Actor:
