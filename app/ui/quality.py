@@ -23,7 +23,8 @@ PATIENCE = 1.5  # seconds below the wanted rate, or with time to spare, before s
 HICCUP = 0.25  # seconds of one frame that count
 AT_ONCE = 0.02  # seconds of a frame for preparing another grid
 LONGEST = 120.0  # seconds that preparing one may take: a machine at rest should rest
-WANTED = 30.0  # frames a second while painting
+WANTED = 60.0  # frames a second while painting, for which a grid is chosen;
+LEAST = 30.0  # below so many, another one is
 # Of a frame. Painting takes what is measured on a grid of `TRIALS` (31 to 35 ms of processor time, three strokes on 128
 # cells, where 32 to 34 were measured), and up to a quarter more between them, as small grids are solved by transforms
 # and others by iterations; and showing the frame and other programs want their part.
@@ -217,7 +218,7 @@ class Quality:
                 self._watch(session)
                 if self.grid < before:
                     self.messages.say(
-                        f"Painting fell below {WANTED:.0f} frames a second, so the grid is now {self.grid} cells "
+                        f"Painting fell below {LEAST:.0f} frames a second, so the grid is now {self.grid} cells "
                         f"instead of {before}. Quality in the inspector changes it."
                     )
 
@@ -239,11 +240,13 @@ class Quality:
         now = session.recipe.fluid.grid
         coarser = max((grid for grid in GRIDS if grid < now), default=None)
         finer = min((grid for grid in GRIDS if grid > now), default=None)
-        slow = dt > 1.1 / WANTED
+        slow = dt > 1.1 / LEAST
         self._slow_for = min(max(self._slow_for + (dt if slow else -dt), 0.0), 2 * PATIENCE)
         if has_stepped and finer is not None and self.speed is not None:
             more = (self.speed.tick(finer) - self.speed.tick(now)) * 1e-3
-            spare = dt + more < (1 - SPARE) / WANTED
+            # A screen of 60 Hz sets the pace: whether there is time to spare, only what was measured tells.
+            paced = dt < 1.1 / WANTED and finer <= self.speed.best_grid
+            spare = paced or dt + more < (1 - SPARE) / WANTED
             self._spare_for = min(max(self._spare_for + (dt if spare else -dt), 0.0), 2 * PATIENCE)
         if self._slow_for > PATIENCE:
             self._wanted = coarser

@@ -1579,6 +1579,29 @@ def test_the_grid_is_finer_again_where_there_is_time(measured: Robot) -> None:
     assert names(measured) == ["Open", "Push", "Push"]
 
 
+@pytest.mark.parametrize(
+    ("speed", "frame", "finer"),
+    [
+        (Speed(fixed=1, growing=60, drawing=5), 1 / 60, False),  # the screen may set that pace, and it can do no more
+        (Speed(fixed=1, growing=60, drawing=5), 1 / 70, False),
+        (Speed(fixed=9, growing=6, drawing=5), 1 / 60, False),
+        (Speed(fixed=9, growing=6, drawing=5), 1 / 120, True),  # it was measured while something else was going on
+    ],
+)
+def test_a_grid_is_no_finer_than_60_frames_a_second_allow(
+    measured: Robot, speed: Speed, frame: float, finer: bool
+) -> None:
+    measured.editor.quality.speed = speed
+    assert speed.best_grid == 96
+    measured.editor.session.begin_with(grid=96, dt=1 / 60, viscosity=0.3, drag=0.0)
+    paint_at(measured, frame, 2 * ENOUGH)  # not every frame has a tick
+    if finer:
+        until_on(measured, 128)
+        return
+    measured.frame(count=200, dt=0.02)
+    assert measured.editor.session.recipe.fluid.grid == 96
+
+
 def test_a_grid_that_was_chosen_stays(measured: Robot) -> None:
     quality, session = measured.editor.quality, measured.editor.session
     session.begin_with(grid=160)
