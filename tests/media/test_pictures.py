@@ -261,6 +261,15 @@ def test_cmyk_becomes_rgb_through_its_profile(tmp_path: Path, ending: str):
     assert magenta[1] > magenta[0] + 50
     assert managed.icc is not None
     assert managed.icc[16:20] == b"RGB "
+    assert plain.note == f"plain.{ending}: its inks (CMYK) become RGB"
+    assert managed.note == f"managed.{ending}: its inks (CMYK) become RGB by its colour profile (test)"
+    image.save(tmp_path / f"other.{ending}", icc_profile=SRGB)
+    image.save(tmp_path / f"broken.{ending}", icc_profile=cmyk_profile()[:200])
+    for name, called in (("other", "sRGB built-in"), ("broken", "unnamed")):
+        other = read_picture(tmp_path / f"{name}.{ending}")
+        np.testing.assert_array_equal(other.pixels, plain.pixels)
+        told = f"its inks (CMYK) become RGB without its colour profile ({called}), which is damaged or not for them"
+        assert (other.icc, other.note) == (None, f"{name}.{ending}: {told}")
 
 
 @pytest.mark.parametrize("compression", ["none", "lzw", "zlib", "packbits", "zstd", "lzma"])
@@ -285,8 +294,8 @@ def test_inks_without_a_profile_are_multiplied(dtype: type):
     """What is left of the light: (1 - ink) (1 - black)."""
     inks = np.random.default_rng(2).integers(0, np.iinfo(dtype).max, (5, 7, 4), dtype, True)
     left = 1 - inks / np.iinfo(dtype).max
-    pixels, icc = cmyk_to_rgb(inks, None)
-    assert icc is None
+    pixels, icc, told = cmyk_to_rgb(inks, None)
+    assert (icc, told) == (None, "its inks (CMYK) become RGB")
     assert pixels.dtype == dtype
     np.testing.assert_allclose(pixels, left[..., :3] * left[..., 3:] * np.iinfo(dtype).max, atol=0.5001)
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from app.errors import UserError
-from app.media.codecs.cmyk import INK, cmyk_to_rgb
+from app.media.codecs.cmyk import cmyk_to_rgb
 from app.media.codecs.metadata import ORIENTATION, sized_exif, told_dpi, upright, upright_dpi, upright_exif, upright_xmp
 from app.media.inputs import check_size
 from app.media.losses import lost
@@ -56,8 +56,8 @@ def picture_of(image: Any, file: Path, losses: list[str], pixels: np.ndarray | N
 
     icc = image.info.get("icc_profile")
     if pixels is None and image.mode == "CMYK":
-        losses.append(INK)
-        pixels, icc = cmyk_to_rgb(np.asarray(image), icc)
+        pixels, icc, told = cmyk_to_rgb(np.asarray(image), icc)
+        losses.append(told)
     elif pixels is None:
         pixels = np.asarray(image if image.mode == (mode := _plain_mode(image)) else image.convert(mode))
     with warnings.catch_warnings(record=True) as complaints:
