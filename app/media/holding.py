@@ -333,7 +333,10 @@ def _named(key: str, told: Callable[[Picture], Sequence[str]], words: Callable[[
 def _layers(picture: Picture, room: Room) -> str:
     if not picture.layers or (room.how.with_layers and "layers" in room.keeps):
         return ""
-    return counted("channel", [layer.name for layer in picture.layers])
+    numbers = dict.fromkeys(layer.part for layer in picture.layers if layer.part != picture.group[0])
+    parts = [picture.parts[number].get("name") or f"{number + 1}" for number in numbers if number < len(picture.parts)]
+    of_them = f" of the {counted('part', parts)}" if parts else ""
+    return counted("channel", [layer.name for layer in picture.layers]) + of_them
 
 
 def _attributes(picture: Picture, room: Room) -> str:

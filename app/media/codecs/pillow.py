@@ -19,6 +19,7 @@ from app.media.losses import lost
 from app.model.picture import Picture
 
 IN_EXIF = ("WEBP", "AVIF")  # which tell their resolution there, and nowhere else
+RAW_EXIF = "Raw profile type exif"  # the text of a PNG that was EXIF before there was a chunk for that
 MOST_TEXT = 64 * 2**20  # bytes of a profile or text in a PNG, unpacked
 
 
@@ -71,6 +72,8 @@ def picture_of(image: Any, file: Path, losses: list[str], pixels: np.ndarray | N
     elif exif and exif.get_ifd(ExifTags.IFD.IFD1):
         losses.append("its thumbnail is not kept")
     texts = {key: str(text) for key, text in getattr(image, "text", {}).items() if key != "XML:com.adobe.xmp"}
+    if encoded is not None:  # as which it is written, upright: a reader of the text would turn it once more
+        texts.pop(RAW_EXIF, None)
     if isinstance(comment := image.info.get("comment"), bytes):
         texts["Comment"] = comment.decode("utf-8", "replace")
     xmp = image.info.get("xmp")
