@@ -216,6 +216,9 @@ Cluster = Annotated[
     str | None,
     typer.Option(metavar="ADDRESS", help="Dask scheduler to hand several pictures to, such as tcp://host:8786."),
 ]
+Verbose = Annotated[
+    bool, typer.Option("--verbose", help="Of several pictures, say of each what there is to say, as it is done.")
+]
 Dpi = Annotated[
     float | None,
     typer.Option(min=1, max=10_000, help="Dots per inch to note in a picture for print. Default: its own."),
@@ -304,6 +307,7 @@ def render(
     max_pixels: MaxPixels = 400_000_000,
     jobs: Jobs = 1,
     cluster: Cluster = None,
+    verbose: Verbose = False,
     gpu: Gpu = None,
 ) -> None:
     """Warp pictures, clips or numbered files by a recipe.
@@ -336,7 +340,7 @@ def render(
     task = Task(recipe=recipe, edits=edits, picture=given[0] if given else None, outputs=outputs, max_pixels=max_pixels)
     if not given and cluster is not None:
         raise UserError("--cluster is for several pictures; name them after the recipe")
-    _perform(task, given, jobs, cluster, gpu)
+    _perform(task, given, jobs, cluster, gpu, verbose)
 
 
 def _check_output(*outputs: Path | None) -> None:
@@ -351,19 +355,22 @@ def _check_output(*outputs: Path | None) -> None:
             raise UserError(f"{output} is an ending without a name; give one such as out{output.name}")
 
 
-def _perform(piece: Piece, given: list[Path], jobs: int, cluster: str | None, gpu: int | None) -> None:
+def _perform(piece: Piece, given: list[Path], jobs: int, cluster: str | None, gpu: int | None, verbose: bool) -> None:
     """Do it for all that is given, one or many."""
     _check_output(*piece.outputs.files, piece.outputs.states)
     if gpu is not None and cluster is not None:
         raise UserError("--gpu is for this machine; start the workers of --cluster with FLUIDWARP_GPU set instead")
     _choose(gpu)
+    from app.media.files import no_empty_folder
     from app.progress import on_terminal
     from app.work.tasks import spread
     from solver.gl.device import Device
 
     output = piece.outputs.file
     if len(given) > 1 or cluster is not None or (given and output and _is_folder(output)):
-        _perform_many(spread(piece, given), jobs, cluster)
+        pieces = spread(piece, given)
+        with no_empty_folder(pieces[0].folder):
+            _perform_many(pieces, jobs, cluster, verbose)
         return
     piece = piece.named()
     with ExitStack() as stack, on_terminal(piece.outputs.files[0].name, None) as progress:
@@ -395,8 +402,8 @@ def _part(frames: str | None) -> tuple[int, int | None]:
     return int(first), (int(last) if last else None if dash else int(first))
 
 
-def _perform_many(tasks: Sequence[Piece], jobs: int, cluster: str | None) -> None:
-    """Do all, with a line about each that fails; what is to be said of several is said of the first, and counted."""
+def _perform_many(tasks: Sequence[Piece], jobs: int, cluster: str | None, verbose: bool) -> None:
+    """Do all; what is to be said of several, and why one fails, is said of the first, unless `verbose`, and counted."""
     from app.progress import leave, on_terminal
     from app.work.batch import run_batch
     from app.work.tasks import NAME
@@ -410,9 +417,9 @@ def _perform_many(tasks: Sequence[Piece], jobs: int, cluster: str | None) -> Non
             failed.append(outcome)
         written += not outcome.error
         alike = {said: said.replace(Path(outcome.label).stem, NAME) for said in outcome.notices}
-        new = [said for said in outcome.notices if alike[said] not in repeated]
+        new = [said for said in outcome.notices if verbose or alike[said] not in repeated]
         repeated.update(alike.values())
-        error = outcome.error if len(failed) == 1 else ""  # the names of all that fail are told at the end
+        error = outcome.error if verbose or len(failed) == 1 else ""  # the names of those that fail come at the end
         _tell(*(_about(outcome.label, said) for said in (error, *new, outcome.verdict) if said))
 
     many = f"{len(tasks)} picture{'s' * (len(tasks) > 1)}"
@@ -422,27 +429,29 @@ def _perform_many(tasks: Sequence[Piece], jobs: int, cluster: str | None) -> Non
             failures = run_batch(tasks, report, progress, jobs, cluster, _tell)
     except Cancelled:
         _fail(f"cancelled; {written} of {many} are written, nothing is half-written", INTERRUPTED)
-    _tell(*(f"and of {count - 1} more: {said}" for said, count in repeated.items() if count > 1))
+    if not verbose:
+        _tell(*(f"and of {count - 1} more: {said}" for said, count in repeated.items() if count > 1))
     if failures and len(tasks) == 1:
         raise typer.Exit(1)
     if failures:
         others = "all others are written" if failures < len(tasks) else "none is written"
         order = {task.label: number for number, task in enumerate(tasks)}
         failed.sort(key=lambda one: order[one.label])
-        raise UserError(f"{failures} of {len(tasks)} pictures failed{_named(failed)}; {others}")
+        raise UserError(f"{failures} of {len(tasks)} pictures failed{_named(failed, verbose)}; {others}")
 
 
-def _named(failed: Sequence[Outcome]) -> str:
-    """Which of several have failed, and whether what is told of the first goes for all of them."""
+def _named(failed: Sequence[Outcome], verbose: bool) -> str:
+    """Which of several have failed, and, unless it is told, whether what is told of the first goes for all of them."""
     from app.media.files import listed
 
     if len(failed) == 1:
         return ""
     named = [(shown(outcome.label), shown(Path(outcome.label).name), outcome.error) for outcome in failed]
     whys = {error.replace(label, "").replace(name, "") for label, name, error in named}
-    why = "; try one of them alone to see why" if len(whys) > 1 else ""
     names = [Path(outcome.label).name for outcome in failed]
-    return f": {listed(names if len({*names}) == len(names) else [outcome.label for outcome in failed])}{why}"
+    told, all_of_them = listed(names if len({*names}) == len(names) else [outcome.label for outcome in failed])
+    wanted = "" if verbose or (all_of_them and len(whys) < 2) else f" tells {'why' if len(whys) > 1 else 'all names'}"
+    return f": {told}{wanted and f'; --verbose{wanted}'}"
 
 
 def _about(label: str, said: str) -> str:
@@ -567,6 +576,7 @@ def apply(
     max_pixels: MaxPixels = 400_000_000,
     jobs: Jobs = 1,
     cluster: Cluster = None,
+    verbose: Verbose = False,
     gpu: Gpu = None,
 ) -> None:
     """Warp pictures, clips or numbered files by a warp map, made by fluidwarp or another program.
@@ -592,7 +602,7 @@ def apply(
         quality=asked.output.quality,
         fps=asked.output.fps,
     )
-    _perform(order, pictures, jobs, cluster, gpu)
+    _perform(order, pictures, jobs, cluster, gpu, verbose)
 
 
 def _map_source(path: Path, kind: str | None, grid: str | None, overscan: int | None, max_pixels: int) -> MapSource:

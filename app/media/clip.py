@@ -17,6 +17,8 @@ from app.model.picture import Picture
 from app.model.timeline import frame_rate
 from app.progress import never
 
+CHANGED = 65  # exit status when a clip changes under the job
+
 FrameRange = tuple[int, int | None]
 """The first and the last number of the frames that are wanted; None is to the end."""
 
@@ -195,6 +197,16 @@ def frame_of(clip: Clip, number: int) -> Picture:
     if found is None:
         raise UserError(f"Cannot read {clip.path}: it has no frame {number}; choose an earlier one.")
     return replace(found[1], chunks={**found[1].chunks, **coded(clip.colours)})
+
+
+def has_changed(path: Path, before: int, size: int) -> UserError:
+    """What is told of a clip whose file is not as it was when it was opened, of so many bytes before and now."""
+    sizes = f", from {before} to {size} bytes" if size != before else ""
+    return UserError(
+        f"Cannot read {path}: it changed while it was read{sizes}; start again when it is written whole.",
+        CHANGED,
+        in_window=f"Cannot read {path}: it is not as it was{sizes}; open it again when that is finished.",
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

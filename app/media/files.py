@@ -116,6 +116,18 @@ def make_folder(path: Path) -> None:
         raise cannot_write(path, error) from None
 
 
+@contextmanager
+def no_empty_folder(path: Path | None) -> Iterator[None]:
+    """When the block ends, a folder that was not there before it, or a part of the way there, goes if it is empty."""
+    new = [] if path is None else [folder for folder in (path, *path.parents) if not folder.exists()]
+    try:
+        yield
+    finally:
+        with suppress(OSError):  # as of one that is not empty
+            for folder in new:
+                folder.rmdir()
+
+
 def check_folder(path: Path) -> None:
     """Raise `UserError` if a folder cannot be made, or written to, as far as that can be told before."""
     try:
@@ -213,8 +225,11 @@ def check_numbers(pattern: str | os.PathLike[str], there: Collection[int], wante
     )
 
 
-def listed(names: Sequence[str]) -> str:
-    """Names in a line: those that differ in a number alone as one, such as "a.png, plate.1001-1004,1010.exr"."""
+def listed(names: Sequence[str]) -> tuple[str, bool]:
+    """Names in a line, those that differ in a number alone as one, such as "a.png, plate.1001-1004,1010.exr".
+
+    And whether these are all.
+    """
     alike: dict[tuple[str, str], list[str]] = {}
     for name in names:
         stem = os.path.splitext(name)[0]
@@ -231,7 +246,7 @@ def listed(names: Sequence[str]) -> str:
                 runs.append([number])
         left -= sum(map(len, runs[:MOST_RUNS]))
         told.append(before + ",".join("-".join(dict.fromkeys((run[0], run[-1]))) for run in runs[:MOST_RUNS]) + after)
-    return ", ".join(told) + (f" and {left} more" if left else "")
+    return ", ".join(told) + (f" and {left} more" if left else ""), not left
 
 
 def takes_place(output: str | os.PathLike[str], source: str | os.PathLike[str]) -> bool:

@@ -15,6 +15,7 @@ import numpy as np
 
 from app.errors import UserError
 from app.media.codecs import avif, exr, jpeg, other, pillow, png, tiff, webp
+from app.media.codecs.metadata import profile_name
 from app.model.picture import Picture
 
 
@@ -142,16 +143,6 @@ def check_picture_output(
             f"Cannot write {path}: the result is {size[0]} x {size[1]} pixels, and {chosen.name} holds no side longer "
             f"than {chosen.longest}; make it smaller, or write a TIFF."
         )
-
-
-def profile_name(icc: bytes) -> str:
-    """What an ICC profile calls itself; "" if it is damaged."""
-    from PIL import ImageCms
-
-    try:
-        return ImageCms.getProfileDescription(ImageCms.ImageCmsProfile(io.BytesIO(icc))).strip() or "unnamed"
-    except (ImageCms.PyCMSError, OSError):
-        return ""
 
 
 def is_srgb(icc: bytes) -> bool:

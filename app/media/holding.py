@@ -14,11 +14,11 @@ from app.errors import UserError
 from app.media.clip import Clip
 from app.media.codecs import png
 from app.media.codecs.exr import unusual_attributes
-from app.media.codecs.metadata import tag_names
+from app.media.codecs.metadata import profile_name, tag_names
 from app.media.depth import as_half, to_bits
 from app.media.encoders import ANIMATIONS, Stream, check_colours_of_picture, depth_of, has_alpha
 from app.media.files import is_sequence
-from app.media.formats import Format, fits_profile, is_srgb, picture_format, profile_name, written_depth
+from app.media.formats import Format, fits_profile, is_srgb, picture_format, written_depth
 from app.media.losses import REC709, counted, few
 from app.model.picture import Picture, srgb_to_linear, unpremultiplied
 
@@ -333,7 +333,10 @@ def _named(key: str, told: Callable[[Picture], Sequence[str]], words: Callable[[
 def _layers(picture: Picture, room: Room) -> str:
     if not picture.layers or (room.how.with_layers and "layers" in room.keeps):
         return ""
-    return counted("channel", [layer.name for layer in picture.layers])
+    numbers = dict.fromkeys(layer.part for layer in picture.layers if layer.part != picture.group[0])
+    parts = [picture.parts[number].get("name") or f"{number + 1}" for number in numbers if number < len(picture.parts)]
+    of_them = f" of the {counted('part', parts)}" if parts else ""
+    return counted("channel", [layer.name for layer in picture.layers]) + of_them
 
 
 def _attributes(picture: Picture, room: Room) -> str:

@@ -15,6 +15,7 @@ MAX_PIXELS = 400_000_000  # of a picture that is unpacked, if nothing else is sa
 MOST_TEXT = 64 * 2**20  # bytes of a recipe: twice as much as its most numbers take when they are saved
 SMALL = 2 * 2**20  # bytes that anything may unpack to
 MOST_UNPACKED = 20  # times its size that a larger member of an archive may unpack to; strokes come to 3
+SIZE = 2  # place of a file's bytes in its `state_of`
 MOST_INDEX = 16 * 2**20  # bytes of an archive's list of members
 
 
@@ -42,7 +43,7 @@ def open_input(path: str | os.PathLike[str], kind: str = "file", most: int | Non
         raise UserError(f"Cannot read {path}: {error.strerror or error}.") from None
 
 
-def state_of(path: str | os.PathLike[str]) -> tuple[int, ...] | None:
+def state_of(path: str | os.PathLike[str] | int) -> tuple[int, ...] | None:
     """What tells a file from one that is written later in its place; None if there is none."""
     try:
         found = os.stat(path)

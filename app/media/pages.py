@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable, Generator, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
@@ -16,11 +15,11 @@ from typing import Any
 import numpy as np
 
 from app.errors import Cancelled, UserError
-from app.media.clip import DEEP, SHALLOW, WHOLE, FileClip, FrameRange
+from app.media.clip import DEEP, SHALLOW, WHOLE, FileClip, FrameRange, has_changed
 from app.media.codecs import pillow, tiff
 from app.media.codecs.decoding import decoding, head_of
 from app.media.formats import kind_of
-from app.media.inputs import MAX_PIXELS, open_input, state_of
+from app.media.inputs import MAX_PIXELS, SIZE, open_input, state_of
 from app.media.losses import lost
 from app.model.picture import Picture
 from app.progress import never
@@ -71,13 +70,18 @@ class Pages(FileClip):
     ) -> Generator[tuple[int, Picture], None, None]:
         """See `Clip`."""
         first, last = part
-        with self._telling_of_changes(), decoding(self.path, self.kind):
+        with decoding(self.path, self.kind):
             for number in range(first, min(len(self.places) if last is None else last + 1, len(self.places))):
                 if cancel():
                     raise Cancelled
                 if is_kept(number):
                     continue
-                picture = self._page(self.places[number])
+                self._check_unchanged()
+                try:
+                    picture = self._page(self.places[number])
+                except Exception:
+                    self._check_unchanged()  # in the meantime
+                    raise
                 mine = picture.width, picture.height, picture.bits, picture.has_alpha
                 if mine != (self.width, self.height, self.bits, self.alpha):
                     raise UserError(
@@ -86,20 +90,14 @@ class Pages(FileClip):
                     )
                 yield number, picture
 
-    @contextmanager
-    def _telling_of_changes(self) -> Iterator[None]:
-        """Let a `UserError` of the block say, instead of what it is in the file, that the file is another one now."""
-        try:
-            yield
-        except UserError:
-            if (state := state_of(self.path)) == self.state:
-                raise
-            how = "is gone" if state is None else "has changed"
-            mend = "put it back" if state is None else "open it again"
-            raise UserError(f"Cannot read {self.path}: it {how} since it was opened; {mend}.") from None
+    def _check_unchanged(self) -> None:
+        """Raise `UserError` if the file is not as it was: a frame would be of another, or none."""
+        with open_input(self.path, "clip") as stream:  # by now it may be a pipe, for which a decoder waits for ever
+            state = state_of(stream.fileno())
+        if self.state and state and state != self.state:
+            raise has_changed(self.path, self.state[SIZE], state[SIZE])
 
     def _page(self, place: int) -> Picture:
-        open_input(self.path, "clip").close()  # by now it may be a pipe, for which a decoder waits for ever
         if self.kind == "TIFF":
             return tiff.read(self.path, self.max_pixels, place)
         with pillow.opened(ANIMATED[self.kind], self.path, self.max_pixels) as image:

@@ -15,14 +15,13 @@ import numpy as np
 
 from app.errors import UserError
 from app.media import ffmpeg
-from app.media.clip import HIGH, WHOLE, Colours, FileClip, FrameRange
+from app.media.clip import HIGH, WHOLE, Colours, FileClip, FrameRange, has_changed
 from app.media.inputs import MAX_PIXELS, check_size, open_input, read_start
 from app.media.losses import lost, not_kept
 from app.model.picture import Picture
 from app.progress import never
 
 SEEKABLE = (".mp4", ".m4v", ".mov", ".mkv", ".webm", ".avi")
-CHANGED = 65  # exit status when a clip changes under the job
 
 # What ffmpeg calls colours that are BT.709 or sRGB, or nearly; and the others' usual names.
 USUAL_PRIMARIES = {"", "unknown", "reserved", "bt709", "gbr"}
@@ -146,13 +145,7 @@ class Video(FileClip):
             return
         is_same = (now.st_dev, now.st_ino) == self.inode
         if (is_same or begins) and (is_same, now.st_size, now.st_mtime_ns) != (True, self.file_size, self.written):
-            sizes = f", from {self.file_size} to {now.st_size} bytes" if now.st_size != self.file_size else ""
-            said = f"Cannot read {self.path}: it changed while it was read{sizes}"
-            raise UserError(
-                f"{said}; start again when it is written whole.",
-                CHANGED,
-                in_window=f"Cannot read {self.path}: it is not as it was{sizes}; open it again when that is finished.",
-            )
+            raise has_changed(self.path, self.file_size, now.st_size)
 
 
 def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Video:

@@ -172,7 +172,7 @@ def test_light_rings_below_zero_unless_that_is_limited(tmp_path: Path, fluidwarp
 
 def test_what_an_output_cannot_hold_is_told_in_a_line(device: Device, tmp_path: Path):
     source, _ = a_shot(tmp_path / "shot.exr")
-    lost = "channels Z, diffuse.G, diffuse.R, instance.id and 7 more"
+    lost = "channels Z, diffuse.G, diffuse.R, instance.id and 7 more of the parts crypto, right"
     attributes = "attributes a name of more than thirty-one letters, framesPerSecond, multiView, screenWindowCenter"
     assert rendered(device, source, tmp_path / "out.png") == (
         f"out.png cuts values above 1; it lacks the picture's {attributes} and 4 more, its {lost}; "

@@ -19,6 +19,7 @@ import OpenEXR
 import pytest
 import tifffile
 from PIL import Image, ImageCms, JpegImagePlugin, PngImagePlugin
+from PIL.PngImagePlugin import PngInfo
 
 from app.errors import UserError
 from app.media import files
@@ -261,6 +262,15 @@ def test_cmyk_becomes_rgb_through_its_profile(tmp_path: Path, ending: str):
     assert magenta[1] > magenta[0] + 50
     assert managed.icc is not None
     assert managed.icc[16:20] == b"RGB "
+    assert plain.note == f"plain.{ending}: its inks (CMYK) become RGB"
+    assert managed.note == f"managed.{ending}: its inks (CMYK) become RGB by its colour profile (test)"
+    image.save(tmp_path / f"other.{ending}", icc_profile=SRGB)
+    image.save(tmp_path / f"broken.{ending}", icc_profile=cmyk_profile()[:200])
+    for name, called in (("other", "sRGB built-in"), ("broken", "unnamed")):
+        other = read_picture(tmp_path / f"{name}.{ending}")
+        np.testing.assert_array_equal(other.pixels, plain.pixels)
+        told = f"its inks (CMYK) become RGB without its colour profile ({called}), which is damaged or not for them"
+        assert (other.icc, other.note) == (None, f"{name}.{ending}: {told}")
 
 
 @pytest.mark.parametrize("compression", ["none", "lzw", "zlib", "packbits", "zstd", "lzma"])
@@ -285,8 +295,8 @@ def test_inks_without_a_profile_are_multiplied(dtype: type):
     """What is left of the light: (1 - ink) (1 - black)."""
     inks = np.random.default_rng(2).integers(0, np.iinfo(dtype).max, (5, 7, 4), dtype, True)
     left = 1 - inks / np.iinfo(dtype).max
-    pixels, icc = cmyk_to_rgb(inks, None)
-    assert icc is None
+    pixels, icc, told = cmyk_to_rgb(inks, None)
+    assert (icc, told) == (None, "its inks (CMYK) become RGB")
     assert pixels.dtype == dtype
     np.testing.assert_allclose(pixels, left[..., :3] * left[..., 3:] * np.iinfo(dtype).max, atol=0.5001)
 
@@ -460,6 +470,21 @@ def test_every_chunk_of_a_png_is_kept_or_told(tmp_path: Path):
     wide = struct.pack(">IIB", 2, 1, 0)  # no unit: only the shape of a pixel
     assert with_chunks(path, pHYs=wide) == "a.png: the shape of its pixels (2:1) is not kept"
     assert with_chunks(path, pHYs=struct.pack(">IIB", 1, 1, 0)) == ""
+
+
+def test_exif_in_a_text_of_a_png_is_written_once_and_upright(tmp_path: Path):
+    """A reader of the text, whose orientation is still that of the file, would turn the picture again."""
+    exif, info = Image.Exif(), PngInfo()
+    exif[0x013B], exif[0x0112] = "somebody", 6
+    raw = (b"Exif\0\0" + exif.tobytes()).hex()
+    info.add_text("Raw profile type exif", f"\nexif\n{len(raw) // 2:8}\n{raw}\n", zip=True)
+    Image.fromarray(smooth(3)[:16]).save(tmp_path / "a.png", pnginfo=info)
+    picture = read_picture(tmp_path / "a.png")
+    assert (picture.width, picture.note) == (16, "")
+    write_picture(tmp_path / "b.png", picture)
+    with Image.open(tmp_path / "b.png") as image:
+        assert image.info.get("Raw profile type exif") is None
+        assert (image.getexif()[0x013B], image.getexif().get(0x0112, 1)) == ("somebody", 1)
 
 
 def test_what_of_a_png_is_damaged_or_left_behind_is_told(tmp_path: Path):

@@ -24,6 +24,7 @@ import pytest
 from app.errors import Cancelled, UserError
 from app.media import files
 from app.media.auxiliary import Pictures
+from app.media.files import no_empty_folder
 from app.media.pictures import read_picture, write_picture
 from app.model.picture import Picture
 from app.model.recipe import Recipe
@@ -36,6 +37,7 @@ from app.work.tasks import Edits, Task, spread
 from app.work.worker import Outcome, perform
 from solver.gl.context import NoSuchDevice
 from solver.gl.device import Device
+from support.commands import Run
 
 ROOT = Path(__file__).parents[2]
 RECIPE = """
@@ -233,8 +235,22 @@ def test_the_command_line(folder: Path):
     assert not (folder / "new").exists()
     (folder / "empty.png").write_bytes(b"")
     ran = fluidwarp("gone.png", "p0.png", "empty.png", "-o", "out")
-    named = "gone.png, empty.png; try one of them alone to see why"
+    named = "gone.png, empty.png; --verbose tells why"
     assert ran.stderr.splitlines()[1:] == [f"fluidwarp: 2 of 3 pictures failed: {named}; all others are written"]
+    ran = fluidwarp("gone.png", "p0.png", "empty.png", "-o", "out", "--verbose")
+    assert ran.stderr.splitlines() == [
+        f"fluidwarp: Cannot read {folder / 'gone.png'}: there is no such file; check the name.",
+        f"fluidwarp: Cannot read {folder / 'empty.png'}: the file is empty; save or download it again.",
+        "fluidwarp: 2 of 3 pictures failed: gone.png, empty.png; all others are written",
+    ]
+    letters = [f"{letter}.png" for letter in "abcdefghij"]
+    ran = fluidwarp(*letters, "-o", "new")
+    assert ran.stderr.endswith("h.png and 2 more; --verbose tells all names; none is written\n")
+    ran = fluidwarp(*letters, "-o", "new", "--verbose")
+    assert [line.partition(": there is")[0] for line in ran.stderr.splitlines()[:-1]] == [
+        f"fluidwarp: Cannot read {folder / name}" for name in letters
+    ]
+    assert ran.stderr.endswith("h.png and 2 more; none is written\n")
     ran = fluidwarp("gone.png", "-o", "out")
     assert ran.returncode == 1
     assert ran.stderr == f"fluidwarp: Cannot read {folder / 'gone.png'}: there is no such file; check the name.\n"
@@ -651,3 +667,20 @@ def test_a_link_among_states_is_not_followed(folder: Path):
     assert outcome.notices == (f"No more states are kept: {state} is a link; remove it",)
     assert (folder / "precious").read_text() == "of somebody"
     assert contents(folder / "a") == contents(folder / "b")
+
+
+def test_where_nothing_is_written_no_folder_is_left(folder: Path, fluidwarp: Run) -> None:
+    """Also of what fails once its picture is read; but one that was there stays, and so does what others put there."""
+    np.save(folder / "square.npy", np.zeros((20, 20, 2), np.float32))
+    for jobs in "1", "2":
+        ran = fluidwarp(folder, "apply", "square.npy", "p0.png", "p1.png", "-o", "new/er/out", "--jobs", jobs)
+        assert "must have the same proportions" in ran.stderr
+        assert ran.stderr.endswith("2 of 2 pictures failed: p0-1.png; none is written\n"), ran.stderr
+        assert not (folder / "new").exists()
+    (folder / "new").mkdir()
+    fluidwarp(folder, "apply", "square.npy", "p0.png", "-o", "new/out")
+    assert list((folder / "new").iterdir()) == []
+    with no_empty_folder(folder / "new" / "a" / "b"):
+        (folder / "new" / "a" / "b").mkdir(parents=True)
+        (folder / "new" / "a" / "else").touch()
+    assert [path.name for path in (folder / "new" / "a").iterdir()] == ["else"]

@@ -16,6 +16,7 @@ import tifffile
 from PIL import Image
 
 from app.errors import UserError
+from app.media.clip import CHANGED
 from app.media.displacement import Displacement
 from app.media.maps import write_map
 from app.media.source import open_source
@@ -211,5 +212,11 @@ def test_a_file_that_another_has_taken_the_place_of_is_told(tmp_path: Path, endi
         {"gone": lambda: None, "pipe": lambda: os.mkfifo(path), "folder": path.mkdir}[other]()
     with pytest.raises(UserError) as error:
         list(pictures)
-    how = "is gone since it was opened; put it back" if other == "gone" else None
-    assert str(error.value) == f"Cannot read {path}: it {how or 'has changed since it was opened; open it again'}."
+    sizes = f"from {len(whole)} to {path.stat().st_size if path.exists() else 0} bytes"
+    said = {
+        "gone": "there is no such file; check the name.",
+        "pipe": "it is a pipe or a device; save it as an ordinary file first.",
+        "folder": "it is a folder; give the name of a clip.",
+    }.get(other, f"it changed while it was read, {sizes}; start again when it is written whole.")
+    assert str(error.value) == f"Cannot read {path}: {said}"
+    assert error.value.status == (CHANGED if path.is_file() else 1)

@@ -105,7 +105,7 @@ def read(file: Path, max_pixels: int) -> Picture:
                 for name in further
             ]
         else:
-            losses.append(not_kept("further part", [part.texts.get("name", "")]))
+            losses.append(not_kept("further part", [part.texts.get("name") or f"{number + 1}"]))
         losses += [loss for loss in part.losses if loss not in losses]
         if part.subsampled:
             losses.append(not_kept("channel", part.subsampled))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import re
 from collections.abc import Collection
 from dataclasses import replace
@@ -131,3 +132,13 @@ def sized_exif(picture: Picture, with_dpi: bool = False) -> bytes:
     if dpi and told_dpi(exif) != dpi:
         exif.update(dict(zip(RESOLUTION, (*dpi, 2), strict=True)))
     return exif.tobytes() if picture.exif or dpi else b""
+
+
+def profile_name(icc: bytes) -> str:
+    """What an ICC profile calls itself; "" if it is damaged."""
+    from PIL import ImageCms
+
+    try:
+        return ImageCms.getProfileDescription(ImageCms.ImageCmsProfile(io.BytesIO(icc))).strip() or "unnamed"
+    except (ImageCms.PyCMSError, OSError):
+        return ""

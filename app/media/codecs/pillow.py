@@ -12,13 +12,14 @@ from typing import Any
 import numpy as np
 
 from app.errors import UserError
-from app.media.codecs.cmyk import INK, cmyk_to_rgb
+from app.media.codecs.cmyk import cmyk_to_rgb
 from app.media.codecs.metadata import ORIENTATION, sized_exif, told_dpi, upright, upright_dpi, upright_exif, upright_xmp
 from app.media.inputs import check_size
 from app.media.losses import lost
 from app.model.picture import Picture
 
 IN_EXIF = ("WEBP", "AVIF")  # which tell their resolution there, and nowhere else
+RAW_EXIF = "Raw profile type exif"  # the text of a PNG that was EXIF before there was a chunk for that
 MOST_TEXT = 64 * 2**20  # bytes of a profile or text in a PNG, unpacked
 
 
@@ -56,8 +57,8 @@ def picture_of(image: Any, file: Path, losses: list[str], pixels: np.ndarray | N
 
     icc = image.info.get("icc_profile")
     if pixels is None and image.mode == "CMYK":
-        losses.append(INK)
-        pixels, icc = cmyk_to_rgb(np.asarray(image), icc)
+        pixels, icc, told = cmyk_to_rgb(np.asarray(image), icc)
+        losses.append(told)
     elif pixels is None:
         pixels = np.asarray(image if image.mode == (mode := _plain_mode(image)) else image.convert(mode))
     with warnings.catch_warnings(record=True) as complaints:
@@ -71,6 +72,8 @@ def picture_of(image: Any, file: Path, losses: list[str], pixels: np.ndarray | N
     elif exif and exif.get_ifd(ExifTags.IFD.IFD1):
         losses.append("its thumbnail is not kept")
     texts = {key: str(text) for key, text in getattr(image, "text", {}).items() if key != "XML:com.adobe.xmp"}
+    if encoded is not None:  # as which it is written, upright: a reader of the text would turn it once more
+        texts.pop(RAW_EXIF, None)
     if isinstance(comment := image.info.get("comment"), bytes):
         texts["Comment"] = comment.decode("utf-8", "replace")
     xmp = image.info.get("xmp")

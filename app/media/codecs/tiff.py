@@ -16,7 +16,7 @@ import numpy as np
 
 from app.errors import UserError
 from app.media.codecs import ZLIB_LEVEL
-from app.media.codecs.cmyk import INK, cmyk_to_rgb
+from app.media.codecs.cmyk import cmyk_to_rgb
 from app.media.codecs.metadata import (
     EXIF_IFD,
     GPS_IFD,
@@ -120,8 +120,8 @@ def read(file: Path, max_pixels: int, place: int | None = None) -> Picture:
     if photometric == "PALETTE":
         pixels = _palette(tags[320])[pixels[..., 0]]
     elif photometric == "SEPARATED":
-        losses.append(INK)
-        pixels, icc = cmyk_to_rgb(pixels, icc)
+        pixels, icc, told = cmyk_to_rgb(pixels, icc)
+        losses.append(told)
     elif photometric == "MINISWHITE" and pixels.dtype != np.float32:
         pixels = np.iinfo(pixels.dtype).max - pixels
     elif photometric not in ("MINISBLACK", "RGB", "YCBCR"):
