@@ -1,4 +1,7 @@
-"""Masks on a canvas of their own: how thick the fluid is and where it is frozen, painted as finely as the picture."""
+"""Masks on a canvas of their own: how thick the fluid is and where it is frozen, painted as finely as the picture.
+
+The class is long because painting, applying and saving all keep track of which texels the fluid has not got yet.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The accumulated map: all motion up to the last remap, as fine as the picture."""
+"""The accumulated map: all motion up to the last remap, as fine as the picture.
+
+The class is long because a remap, closing a map and undoing under a brush redraw the same tiles of the same levels.
+"""
 
 from __future__ import annotations
 
