@@ -184,7 +184,7 @@ class Scheme(ABC):
 
     @abstractmethod
     def faces(self) -> Field:
-        """The fluid's velocity on MAC faces."""
+        """What flows through the MAC faces: the fluid's velocity times the open part of each, lengths / s."""
 
     def carrier(self) -> Field:
         """The velocity on MAC faces that carries the picture: the fluid's, plus `local` where faces are open."""
@@ -222,12 +222,12 @@ class Scheme(ABC):
 
     @property
     def u(self) -> np.ndarray:
-        """Velocity to the right through the faces between columns, walls included, (ny, nx + 1) float32."""
+        """What flows to the right through the faces between columns, with walls, (ny, nx + 1) float32; see `faces`."""
         return np.pad(self.faces().get()[..., 0], ((0, 0), (0, 1)))
 
     @property
     def v(self) -> np.ndarray:
-        """Velocity downwards through the faces between rows, walls included, (ny + 1, nx) float32."""
+        """What flows downwards through the faces between rows, with walls, (ny + 1, nx) float32; see `faces`."""
         return np.pad(self.faces().get()[..., 1], ((0, 1), (0, 0)))
 
     def vorticity(self) -> np.ndarray:

@@ -1,6 +1,6 @@
 """Masks on a canvas of their own: how thick the fluid is and where it is frozen, painted as finely as the picture.
 
-One long class: both masks share the canvas, and reach the fluid together, cell by cell where either has changed.
+The class is long because painting, applying and saving all keep track of which texels the fluid has not got yet.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Multigrid cycles for the viscous operator: Chebyshev-Jacobi smoothing, transposed transfers, a direct solve.
 
-One long class: a cycle goes through all levels, and its parts read best together.
+The class is long because which cycle is made, and with which weights, follows from what its levels have taken up.
 """
 
 from __future__ import annotations
@@ -218,7 +218,7 @@ class Multigrid:
         self.smooth(level, rhs, self._weights(level))
 
     def _coarse_correction(self, level: Level, rhs: PackedFaces, rigid: Deflation | None, is_full: bool) -> None:
-        """f += P A_coarse^-1 P' (rhs - A f); with `rigid` parts S P in place of P, between two corrections of these."""
+        """f += P A_coarse^-1 P' (rhs - A f); with `rigid` parts M P in place of P, between two corrections of these."""
         # The write side is free until the correction is added.
         faces, free = level.faces.read, level.faces.write
         self.residual(level, faces, rhs, free)

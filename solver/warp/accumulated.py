@@ -1,6 +1,6 @@
 """The accumulated map: all motion up to the last remap, as fine as the picture.
 
-One long class: whatever moves, saves or undoes the map does so in the open one and in all that are closed.
+The class is long because a remap, closing a map and undoing under a brush redraw the same tiles of the same levels.
 """
 
 from __future__ import annotations
