@@ -336,7 +336,10 @@ def render(
             "--forward, --offsets, --overscan and --map-size say how --map is written; give --map and a name"
         )
     given = [*([image] if image else []), *(pictures or [])]
-    outputs = Outputs(output, stats, maps, _part(frames), animated, bits, strip, codec, states, resume, dpi=dpi)
+    outputs = Outputs(
+        output, stats, maps, part=_part(frames), animated=animated, bits=bits, strip=strip, codec=codec, states=states,
+        resume=resume, dpi=dpi,
+    )  # fmt: skip
     task = Task(recipe=recipe, edits=edits, picture=given[0] if given else None, outputs=outputs, max_pixels=max_pixels)
     if not given and cluster is not None:
         raise UserError("--cluster is for several pictures; name them after the recipe")
@@ -520,7 +523,10 @@ def fit(
     from solver.gl.device import Device
 
     _check_output(output, arrived)
-    job = FitJob(recipe, tuple(pairs or ()), masks, output, arrived, image, evaluations, local, max_pixels)
+    job = FitJob(
+        recipe, tuple(pairs or ()), masks, output, arrived=arrived, image=image, evaluations=evaluations, local=local,
+        max_pixels=max_pixels,
+    )  # fmt: skip
     job.check()
     _choose(gpu)
     until = None if time_limit is None else monotonic() + time_limit

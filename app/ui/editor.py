@@ -108,8 +108,9 @@ class Editor:
             lambda chord: self._key("space", chord if self.keys.action(chord) else "space"),
         )
         self.commands = Commands(
-            self.workspace, self.state, self.pointer, self.files, self.chooser, self.exports, self.fits,
-            self.dialogs, self.messages, likes, self.selecting, self.keys,
+            workspace=self.workspace, state=self.state, pointer=self.pointer, files=self.files, chooser=self.chooser,
+            exports=self.exports, fits=self.fits, dialogs=self.dialogs, messages=self.messages, preferences=likes,
+            selecting=self.selecting, keys=self.keys,
         )  # fmt: skip
         self._styled: tuple[object, ...] = ()
         self._once_typed: list[str] = []  # actions that wait until what is being typed has been taken

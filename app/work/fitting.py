@@ -678,7 +678,7 @@ class _Search:
                 self.notices.append(f"{self._label(number)} cannot be met: its {frozen[0]} is frozen")
             elif part[y0, x0] != part[y1, x1]:
                 self.notices.append(
-                    f"{self._label(number)} cannot be met: what is frozen parts its point from its place"
+                    f"{self._label(number)} cannot be met: what is frozen lies between its point and its place"
                 )
             else:
                 hopeful.append(number)

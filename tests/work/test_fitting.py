@@ -89,7 +89,7 @@ def test_the_same_is_found_again_also_from_what_was_fitted(device: Device):
         ([[[0.3, 0.5], [0.6, 0.5]], [[0.6, 0.5], [0.3, 0.5]]], "", '"pair 2" cross each other\'s way'),
         ([[[0.5, 0.5], [0.7, 0.5]], [[0.2, 0.5], [0.3, 0.5]]], WALL, "pair 1 cannot be met: its point is frozen"),
         ([[[0.3, 0.5], [0.5, 0.5]]], WALL, "pair 1 cannot be met: its place is frozen"),
-        ([[[0.2, 0.5], [0.8, 0.5]]], WALL, "pair 1 cannot be met: what is frozen parts its point from its place"),
+        ([[[0.2, 0.5], [0.8, 0.5]]], WALL, "pair 1 cannot be met: what is frozen lies between its point and its place"),
     ],
     ids=["point outside", "place outside", "coincident", "crossing", "frozen", "into what is frozen", "beyond a wall"],
 )
