@@ -1,4 +1,7 @@
-"""Writing animations frame by frame: videos, animated pictures and numbered sequences."""
+"""Writing animations frame by frame: videos, animated pictures and numbered sequences.
+
+Long, as the three are written to the same rules: what is half-written, cancelled or fails leaves nothing behind.
+"""
 
 from __future__ import annotations
 

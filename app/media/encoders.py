@@ -19,8 +19,8 @@ from app.media.video import NAMES
 from app.model.picture import Picture
 
 
-# What players take a video for. The filters set the tags: the frames' own overrule those given to the encoder.
 def tagged(colours: Colours) -> str:
+    """The filters that give a video the tags players go by: the frames' own overrule those given to the encoder."""
     matrix, tags = colours.matrix, f"color_primaries={colours.primaries}:color_trc={colours.transfer}"
     scaled = f"scale=out_color_matrix={matrix}:out_range=tv:flags=accurate_rnd+full_chroma_int+lanczos"
     return f"{scaled},setparams=colorspace={matrix}:{tags}:range=tv"

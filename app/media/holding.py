@@ -1,4 +1,7 @@
-"""What of a picture the file that is made of it does not hold: one table, for stills, sequences and animations."""
+"""What of a picture the file that is made of it does not hold: one table, for stills, sequences and animations.
+
+Long, as each field of a picture has its row, with the reason and the sentence.
+"""
 
 from __future__ import annotations
 

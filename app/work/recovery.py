@@ -2,6 +2,8 @@
 
 A journal is a folder of its own in the user's state folder, with a lock that dies with the process that writes it: what
 can be locked belongs to nobody that lives.
+
+Long, as a writer and a finder must agree on every file of such a folder, and on who may remove it.
 """
 
 from __future__ import annotations
