@@ -794,17 +794,19 @@ def test_what_is_wound_up_does_not_fold(device: Device) -> None:
     warp.release()
 
 
+@pytest.mark.parametrize("texels", [4, 6])
 @pytest.mark.parametrize("seed", [2, 3, 11])
-def test_a_map_is_closed_before_it_is_too_steep(seed: int, device: Device) -> None:
-    """Swirls one after another: maps closed once they were too steep had a det J of .12, .06 and -2.6 in the end."""
-    rng, warp = np.random.default_rng(seed), WarpMap(device, Grid(32, 32), (192, 192))
+def test_a_map_is_closed_before_it_is_too_steep(seed: int, texels: int, device: Device) -> None:
+    """Swirls one after another. With 6 texels a cell maps closed once they were too steep had a det J of .12, .06, -2.6
+    in the end; with 4 maps closed by their steepness alone one of .16, -.18, .23."""
+    rng, warp = np.random.default_rng(seed), WarpMap(device, Grid(32, 32), (32 * texels, 32 * texels))
     for _ in range(10):
         radius = rng.uniform(0.12, 0.3)
         flow, speed = swirl(tuple(rng.uniform(0.3, 0.7, 2)), radius), rng.choice([-2.0, 2.0])
         for _ in range(5):
             warp.advance_prescribed(lambda x, y, t, flow=flow, by=speed: tuple(by * v for v in flow(x, y, t)), 0.05)
     assert closed(warp) > 0
-    assert warp.statistics().det_min > 0.3
+    assert warp.statistics().det_min > 0.5
     warp.release()
 
 
