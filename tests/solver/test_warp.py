@@ -810,6 +810,37 @@ def test_a_map_is_closed_before_it_is_too_steep(seed: int, texels: int, device: 
     warp.release()
 
 
+def test_a_bend_at_the_border_of_what_is_held_closes_no_map(device: Device) -> None:
+    """There the cells around a texel rightly differ in their det J: what is held does not move."""
+    warp, frozen = WarpMap(device, Grid(32, 32), (128, 128)), np.zeros((128, 128), np.float32)
+    frozen[:, :40] = 1.0
+    warp.hold(device.upload(frozen))
+
+    def flow(x: np.ndarray, y: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
+        speed = np.exp(-(((x - 0.3125) / 0.1) ** 2)) * np.sin(np.pi * y) ** 2 / 32
+        return 0.35 * speed, 1.2 * speed
+
+    for part in (0.1, 1.0, 1.0):
+        warp.advance_prescribed(flow, part)
+        warp.remap()
+    assert closed(warp) == 0
+    warp.release()
+
+
+def test_a_map_that_was_folded_before_is_not_closed_for_that(device: Device) -> None:
+    """Closing would not mend it, and each remap would close one more."""
+    warp, x = WarpMap(device, Grid(32, 32), (128, 128)), (np.arange(128) + 0.5) / 128
+    given = np.zeros((128, 128, 2), np.float32)
+    given[..., 0] = 0.02 * np.sin(32 * np.pi * x)
+    warp.set(given)
+    assert warp.statistics().folds > 0
+    for _ in range(3):
+        warp.advance_prescribed(lambda x, y, t: (0 * x + 0.05 / 32, 0 * x), 1.0)
+        warp.remap()
+    assert closed(warp) == 0
+    warp.release()
+
+
 def test_closed_maps_are_saved_and_come_back(device: Device) -> None:
     """To the same map, with none of them yet and with more than there were; also off the GPU, into another."""
     warp, flow = wound_up(device, 4.0), swirl((0.5, 0.5), 0.45)
