@@ -16,13 +16,16 @@ class Steepness:
         size: (width, height) of the fields.
         name: of what is looked at.
         defines: of the shader.
+
+    Attributes:
+        blocks: what was found, one for each block of the corners between the texels.
     """
 
     def __init__(self, device: Device, size: tuple[int, int], name: str, **defines: object) -> None:
         self.device = device
         self._defines = defines
         blocks = blocks_of((size[0] - 1, size[1] - 1))
-        self._largest = device.field(blocks, 1, f"{name}, steepness")
+        self.blocks = device.field(blocks, 1, f"{name}, steepness")
         self._find_largest = Reduction(device, blocks, 1, "max")
 
     def of(self, field: Field, spacing: tuple[float, float]) -> float:
@@ -35,17 +38,17 @@ class Steepness:
         if regions is not None:
             regions = [(x // SIDE, y // SIDE, *blocks_of((width, height))) for x, y, width, height in regions]
         find = self.device.pass_("warp/steepness.frag", **self._defines)
-        find(self._largest, region=regions, displacement=field, spacing=spacing, side=SIDE)
+        find(self.blocks, region=regions, displacement=field, spacing=spacing, side=SIDE)
 
     def found(self) -> float:
         """The largest of all that was looked at since `forget`; waits for the GPU."""
-        return float(self._find_largest(self._largest)[0])
+        return float(self._find_largest(self.blocks)[0])
 
     def forget(self) -> None:
         """Forget what was looked at."""
-        self._largest.clear()
+        self.blocks.clear()
 
     def release(self) -> None:
         """Free the textures."""
-        for item in (self._largest, self._find_largest):
+        for item in (self.blocks, self._find_largest):
             item.release()

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 from itertools import takewhile
 from typing import Any, Protocol
 
@@ -18,6 +19,7 @@ from solver.gl.passes import Region
 from solver.gl.tiled import TILE, SavedTiles, TiledField
 from solver.grid import Grid
 from solver.steepness import Steepness
+from solver.warp.evenness import FLAT, Evenness
 from solver.warp.state import (
     ACCUMULATED,
     CLOSED,
@@ -36,6 +38,9 @@ MOST_TEXELS = 2**25  # in all: 256 MiB each of two textures
 REACH = 3  # texels that the cubic reaches to one side, at most
 NOWHERE = 1e-4  # texels: a smaller displacement counts as none
 STEEPEST = 6.0  # largest |grad A| of a map that is not closed: one that stretches more folds between its texels
+# The least part that det J on one side of a texel may be of that on another: where they differ by more than the smaller
+# one, the interpolation may as well be folded.
+LEAST_EVEN = 0.5
 CLOSED_TEXELS = 8  # along a cell, at least, of a closed map that has fewer texels than A: with so many none folds
 
 Limits = tuple[float, float, float, float]
@@ -97,6 +102,7 @@ class AccumulatedMap:
         self.extent = extent
         self.closed: list[TiledField] = []
         self._steepness = Steepness(device, size, "accumulated map", TILE=TILE)
+        self._evenness = Evenness(device, size, self._steepness.blocks)
         self.now = TiledField(device, size, 2, "accumulated map")
         self._next = TiledField(device, size, 2, "accumulated map, anew")
         self.undone: TiledField | None = None
@@ -187,11 +193,11 @@ class AccumulatedMap:
             pairs.append((self.undone, self._next_undone, {"undone": self.undone}))
         return pairs
 
-    def draw(self, part: float, draw: Draw) -> bool:
-        """Do a `part`, 0-1, of what is planned.
+    def draw(self, part: float, draw: Draw, held: Field | None = None) -> bool:
+        """Do a `part`, 0-1, of what is planned; `held`: where the map is held.
 
         Returns:
-            False if that became too steep: then nothing is taken over, and the map as it was is closed.
+            False if that became too steep for its texels: then nothing is taken over, and the map as it was is closed.
         """
         before, until = self._done, math.ceil(part * (len(self._moved) + len(self._copied)))
         count, anew = len(self._moved), self._moved[before:until]
@@ -205,7 +211,7 @@ class AccumulatedMap:
         if part < 1:
             return True
         # A submap by itself is as steep as it is: closing a map of nothing would not mend that.
-        if self._may_close and self.now.tiles and self._steepness.found() > STEEPEST**2:
+        if self._may_close and self.now.tiles and self._is_too_steep(held):
             self.forget()
             self._close()
             return False
@@ -232,8 +238,19 @@ class AccumulatedMap:
     def _look(self, tiles: list[Region]) -> None:
         """Look at how steep tiles of `_next` are, if another map may be closed."""
         if self._may_close:
-            spacing = self.extent[0] / self.size[0], self.extent[1] / self.size[1]
-            self._steepness.look(self._next, spacing, tiles)
+            self._steepness.look(self._next, self._spacing, tiles)
+
+    def _is_too_steep(self, held: Field | None) -> bool:
+        """True if the map that was drawn is more than its texels carry, and was not so before; waits for the GPU."""
+        steepest = self._steepness.found()
+        if not FLAT**2 < steepest <= STEEPEST**2:
+            return steepest > FLAT**2
+        even = partial(self._evenness.of, spacing=self._spacing, images=self.edges, regions=self._moved, held=held)
+        return even(self._next) < LEAST_EVEN <= even(self.now)
+
+    @property
+    def _spacing(self) -> tuple[float, float]:
+        return self.extent[0] / self.size[0], self.extent[1] / self.size[1]
 
     def _close(self) -> None:
         """Keep it as it is, and go on with a map of nothing."""
@@ -336,7 +353,7 @@ class AccumulatedMap:
     def release(self) -> None:
         """Free the textures."""
         self._open()
-        for thing in (self.now, self._next, self._steepness):
+        for thing in (self.now, self._next, self._steepness, self._evenness):
             thing.release()
 
     def _open(self, left: int = 0) -> None:

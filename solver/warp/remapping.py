@@ -208,7 +208,7 @@ class Remapping:
                 compose = self.device.pass_("warp/compose.frag", REMAP=1, **fine, **carry, **defines)
                 compose(target, region=parts, **inputs, **undone)
 
-        return self._accumulated.draw(part, draw)
+        return self._accumulated.draw(part, draw, self._frozen.held)
 
     @property
     def _whole(self) -> int:

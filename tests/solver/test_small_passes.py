@@ -12,6 +12,7 @@ from app.model.picture import srgb_to_linear
 from solver.brush.tip import Tip
 from solver.gl.device import Device
 from solver.grid import Grid
+from support.reference import PAD, with_images
 
 GRID = Grid(20, 12, (1.0, 0.75))
 ENDS = np.array([(0.3, 0.2), (0.6, 0.5)])
@@ -230,3 +231,37 @@ def test_faces_are_unpacked_two_by_two(device: Device) -> None:
     for axis, packed in enumerate((u, v)):
         inside = packed[1:-1, 1:-1].reshape(6, 10, 2, 2)  # within the ring
         np.testing.assert_array_equal(found[..., axis], inside.swapaxes(1, 2).reshape(12, 20))
+
+
+@pytest.mark.parametrize(("images", "held"), [((1.0, -1.0, -1.0, 1.0), False), ((0.0,) * 4, False), ((1.0,) * 4, True)])
+def test_where_the_cells_around_a_texel_disagree_on_its_area_is_found(
+    images: tuple[float, float, float, float], held: bool, device: Device
+) -> None:
+    """Each cell by the cubic through its own texels; not in blocks that are not steep, nor next to what is held."""
+    spacing, moved = GRID.spacing, 0.01 * RNG.standard_normal((12, 20, 2)).astype(np.float32)
+    beyond = with_images(moved, images).astype(float)
+    middle = slice(PAD, -PAD), slice(PAD, -PAD)
+    slopes = []
+    for axis, h in ((1, spacing[0]), (0, spacing[1])):
+        for first in (-1, -2):  # the cell after the texel, and that before it
+            fit = np.array([np.polyder(np.poly1d(np.polyfit(range(first, first + 4), one, 3)))(0) for one in np.eye(4)])
+            parts = [fit[k] * np.roll(beyond, -(first + k), axis) for k in range(4)]
+            slopes.append(np.sum(parts, axis=0)[middle] / h)
+    dets = [(1 + a[..., 0]) * (1 + b[..., 1]) - a[..., 1] * b[..., 0] for a in slopes[:2] for b in slopes[2:]]
+    least, greatest = np.min(dets, axis=0), np.max(dets, axis=0)
+    uneven = np.where(greatest > 0, -least / np.where(greatest > 0, greatest, 1), 1)
+    more: dict[str, Any] = {}
+    if not any(images):
+        uneven[:2] = uneven[-2:] = uneven[:, :2] = uneven[:, -2:] = -1
+    if held:
+        far = np.abs(np.arange(12) - 3)[:, None] + np.abs(np.arange(20) - 10)  # along the axes, from one held texel
+        more = {"HELD": 1, "held": np.where(far == 0, 1, (127 - far) / 255).astype(np.float32)}
+        uneven[far <= 1] = -1
+    steepness = np.array([[2.0, 2.0, 2.0], [2.0, 0.9, 2.0]], np.float32)
+    given = {"displacement": moved, "steepness": steepness, "spacing": spacing, "images": images, "side": 8.0, **more}
+    found = drawn(device, "warp/evenness.frag", 1, (3, 2), FLAT=1.0, **given)
+    for row, column in np.ndindex(2, 3):
+        block = uneven[8 * row : 8 * row + 8, 8 * column : 8 * column + 8]
+        wanted = -1.0 if (row, column) == (1, 1) else block.max()
+        assert found[row, column] == pytest.approx(wanted, rel=1e-4, abs=1e-4)
+    assert np.unique(found).size > 3
