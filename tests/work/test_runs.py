@@ -1,4 +1,7 @@
-"""A recipe gives the same for ever: numbers of short runs of all that one can have, as `golden/runs.txt` has them."""
+"""A recipe gives the same for ever: numbers of short runs of all that one can have, as `golden` has them.
+
+`runs.txt` has what comes of them, and `passes.txt` what each pass draws at first.
+"""
 
 from __future__ import annotations
 
@@ -20,8 +23,9 @@ from app.work.replay import Replay
 from solver.gl.device import Device
 from solver.resample.plan import Edges, GivenMap, Sampling
 from solver.resample.sampler import Sampler
+from support.drawn_passes import FirstDraws
 from support.gl_objects import Made
-from support.golden import GOLDEN, Golden, told
+from support.golden import CLOSE, GOLDEN, Golden, told
 
 RUNS: dict[str, Any] = tomllib.loads((GOLDEN / "runs.toml").read_text("utf-8"))
 TICKS = 9
@@ -35,11 +39,22 @@ def picture(width: int = 60, height: int = 45, channels: int = 3) -> np.ndarray:
     return ((0.4 * np.stack(waves, axis=-1) + 0.5 + 0.1 * rough).clip(0, 1) * 255).astype(np.uint8)
 
 
+def as_drawn(name: str, wanted: list[float]) -> float:
+    """How near to what is written down the numbers of a pass must be."""
+    return CLOSE * abs(wanted[0]) + 1e-9
+
+
 def cost(device: Device) -> list[float]:
     """How many passes, and thousands of texels read and written, in all stages, since they were last taken."""
     timings = device.timings
     passes, *texels = (sum(book.values()) for book in (timings.passes, timings.texel_reads, timings.texel_writes))
     return [float(passes), *(count / 1e3 for count in texels)]
+
+
+@pytest.fixture(scope="module")
+def passes(shared_device: Device) -> Iterator[Golden]:
+    with Golden.of_software(shared_device, "passes.txt") as golden:
+        yield golden
 
 
 @pytest.fixture(scope="module")
@@ -50,9 +65,9 @@ def golden(shared_device: Device) -> Iterator[Golden]:
 
 @pytest.mark.parametrize("name", RUNS)
 def test_a_run_gives_the_numbers_that_are_written_down(
-    device: Device, name: str, golden: Golden, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    device: Device, name: str, golden: Golden, passes: Golden, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    made = Made(monkeypatch)
+    made, drawn = Made(monkeypatch), FirstDraws(monkeypatch)
     write_picture(tmp_path / "field.png", Picture(picture(30, 20)))
     parts = {"duration": 1.0} | RUNS[name]
     parts["fluid"] = {"grid": 36, "dt": 0.025, "viscosity": 0.002} | parts.get("fluid", {})
@@ -88,6 +103,7 @@ def test_a_run_gives_the_numbers_that_are_written_down(
     finally:
         replay.release()
     assert not made.left, "these are still on the GPU"
+    passes.compare_all({f"{name} {what}": row for what, row in drawn.rows.items()}, f"{name} ", as_drawn)
     for what, numbers in found.items():
         golden.compare(f"{name} {what}", numbers, 0.1 if what.startswith("decades") else None)
 
