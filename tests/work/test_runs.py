@@ -70,8 +70,9 @@ def test_a_run_gives_the_numbers_that_are_written_down(
     made, drawn = Made(monkeypatch), FirstDraws(monkeypatch)
     write_picture(tmp_path / "field.png", Picture(picture(30, 20)))
     parts = {"duration": 1.0} | RUNS[name]
+    size = parts.pop("size", (60, 45))
     parts["fluid"] = {"grid": 36, "dt": 0.025, "viscosity": 0.002} | parts.get("fluid", {})
-    replay = Replay(device, Recipe.model_validate(frozen(parts)), Pictures(Picture(picture()), tmp_path))
+    replay = Replay(device, Recipe.model_validate(frozen(parts)), Pictures(Picture(picture(*size)), tmp_path))
     found: dict[str, list[float]] = {}
     try:
         device.timings.take()
@@ -109,7 +110,10 @@ def test_a_run_gives_the_numbers_that_are_written_down(
 
 
 @pytest.mark.parametrize("channels", [1, 2, 3, 4])
-def test_pictures_are_looked_up_as_it_is_written_down(device: Device, channels: int, golden: Golden) -> None:
+def test_pictures_are_looked_up_as_it_is_written_down(
+    device: Device, channels: int, golden: Golden, passes: Golden, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn = FirstDraws(monkeypatch)
     y, x = np.mgrid[0:30, 0:40] / 40
     values = np.stack([0.2 * np.sin(9 * y) + 0.1 * x, 0.15 * np.cos(11 * x) - 0.2 * y], axis=-1).astype(np.float32)
     warp, sampler = GivenMap(device, values), Sampler(device)
@@ -135,4 +139,6 @@ def test_pictures_are_looked_up_as_it_is_written_down(device: Device, channels: 
     finally:
         sampler.release()
         warp.release()
+    rows = {f"{channels} channels {what}": row for what, row in drawn.rows.items()}
+    passes.compare_all(rows, f"{channels} channels ", as_drawn)
     golden.compare(f"{channels} channels, passes, thousands of texels read and written", cost(device))
