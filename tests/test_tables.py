@@ -103,9 +103,9 @@ def test_what_need_not_be_given_is_as_it_is_written_down() -> None:
     found = []
     for name, one in offered():
         called = getattr(one, "__func__", one)
-        if callable(called) and not (isinstance(one, type) and issubclass(one, BaseModel)):
-            if given := defaults(called):
-                found.append(f"{name}: {PLACES.sub('', given)}")
+        is_of_a_recipe = isinstance(one, type) and issubclass(one, BaseModel)
+        if callable(called) and not is_of_a_recipe and (given := defaults(called)):
+            found.append(f"{name}: {PLACES.sub('', given)}")
     if WRITES:
         DEFAULTS.write_text("\n".join(found) + "\n", "utf-8")
     assert found == DEFAULTS.read_text("utf-8").splitlines()
