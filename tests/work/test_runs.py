@@ -20,7 +20,10 @@ from app.model.recipe import Recipe
 from app.model.schema import frozen
 from app.work.export import displacement
 from app.work.replay import Replay
+from solver.fluid import Fluid
 from solver.gl.device import Device
+from solver.grid import Grid
+from solver.params import FluidParams, Walls
 from solver.resample.plan import Edges, GivenMap, Sampling
 from solver.resample.sampler import Sampler
 from support.drawn_passes import FirstDraws
@@ -107,6 +110,27 @@ def test_a_run_gives_the_numbers_that_are_written_down(
     passes.compare_all({f"{name} {what}": row for what, row in drawn.rows.items()}, f"{name} ", as_drawn)
     for what, numbers in found.items():
         golden.compare(f"{name} {what}", numbers, 0.1 if what.startswith("decades") else None)
+
+
+@pytest.mark.parametrize("contrast", [False, True])
+def test_a_fluid_of_one_s_own_takes_the_steps_that_are_written_down(
+    device: Device, contrast: bool, passes: Golden, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Walls that move, solids one cell thin, and a velocity that is given."""
+    drawn, grid = FirstDraws(monkeypatch), Grid(44, 29)
+    x, y = grid.centres()
+    fluid = Fluid(device, grid, FluidParams(walls=Walls("none", (0.3, -0.2, 1.0, 0.5)), drag=0.4))
+    try:
+        fluid.set_viscosity(np.where((x < 0.5) & contrast, 1e-3, 0.1))
+        if contrast:
+            fluid.set_solid((np.random.default_rng(4).random(x.shape) < 0.06) | (np.abs(x - 0.4) + y < 0.02))
+        fluid.set_velocity(lambda x, y, t: (np.sin(5 * y + x), np.cos(4 * x - y)))
+        for _ in range(3):
+            fluid.step(0.05, lambda x, y, t: (0 * x, x - y))
+    finally:
+        fluid.release()
+    name = f"contrast {contrast}"
+    passes.compare_all({f"{name} {what}": row for what, row in drawn.rows.items()}, f"{name} ", as_drawn)
 
 
 @pytest.mark.parametrize("channels", [1, 2, 3, 4])
