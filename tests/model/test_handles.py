@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from app.errors import UserError
-from app.model.handles import RecipeHandle, RecipePin, heading, labelled, objections
+from app.model.handles import LONGEST_LINE, RecipeHandle, RecipePin, heading, labelled, objections
 from app.model.recipe import Recipe
 from app.model.schema import frozen
 
@@ -124,6 +124,17 @@ def test_how_near_two_handles_may_lie_and_be_led() -> None:
     assert pair(0.5, (0.5, 0.5), 0.58, (0.521, 0.5)) == []
     assert pair(0.5, (0.58, 0.5), 0.58, (0.5, 0.51)) == ["cross each other's way"]
     assert pair(0.5, (0.5, 0.58), 0.58, (0.5, 0.5)) == []
+
+
+@pytest.mark.parametrize("closed", [False, True])
+def test_a_long_line_reaches_as_far_as_a_part_of_its_length_and_an_outline_has_one_side_more(closed: bool) -> None:
+    corners, to = [[0.1, 0.1], [0.5, 0.1], [0.5, 0.2]], [0.6, 0.8]
+    length = 0.4 + 0.1 + math.hypot(0.4, 0.1) * closed
+    led = RecipeHandle.model_validate(frozen({"points": corners, "to": to, "closed": closed, "radius": 0.01}))
+    far = re.search(r"as far as it reaches, of ([\d.]+) to its goal", " ".join(objections([led], [], (1.0, 1.0))))
+    assert far is not None
+    goal = np.add(corners, np.subtract(to, led.at))
+    assert float(far[1]) == pytest.approx(np.hypot(*(goal - corners).T).max() / (length / LONGEST_LINE), rel=5e-3)
 
 
 def test_who_crosses_whose_way_is_told_as_they_come_near_at_some_moment() -> None:

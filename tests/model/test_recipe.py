@@ -258,6 +258,22 @@ def test_what_must_not_go_beyond_another_may_be_the_same(text: str):
     Recipe.parse(text)
 
 
+@pytest.mark.parametrize(
+    ("table", "kinds"),
+    [
+        ("force", ("point", "curve", "field", "gradient", "vortex", "source", "sink")),
+        ("viscosity", ("constant", "picture", "path")),
+        ("freeze", ("constant", "picture", "path")),
+    ],
+)
+def test_of_a_kind_that_there_is_not_all_are_told_that_there_are(table: str, kinds: tuple[str, ...]):
+    all_of_them = f"a.toml, line 1: {table}[1]: 'kind' must be one of {', '.join(map(repr, kinds))}"
+    for text, more in (("kind = 'whirl'", ", not 'whirl'"), ("", "")):
+        with pytest.raises(UserError) as caught:
+            Recipe.parse(f"[[{table}]]\n{text}", "a.toml")
+        assert str(caught.value) == all_of_them + more
+
+
 def test_of_several_faults_one_is_told_and_how_many_more_there_are():
     """A key that is not known comes first, as another may lack for it."""
     faults = ("duration = 0", "edges = 3", "picutre = 'a.png'")
