@@ -881,3 +881,17 @@ def test_what_prints_into_a_full_disk_and_where_the_folder_is_gone_a_sentence_sa
     gone = f"mkdir gone && cd gone && rmdir ../gone && exec {program} render a.toml -o b.png"
     status, told = said(["sh", "-c", gone], cwd=tmp_path)
     assert (status, told) == (1, "fluidwarp: the folder that this runs in is gone; go to another one\n")
+
+
+def test_a_mistake_of_which_nothing_is_said_is_told_by_its_kind(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+):
+    def broken(**_: object) -> None:
+        raise RuntimeError
+
+    monkeypatch.setattr("app.cli.cli", broken)
+    with pytest.raises(SystemExit) as ended:
+        cli.main()
+    assert ended.value.code == 70
+    said = "fluidwarp: this is a bug in fluidwarp (RuntimeError); FLUIDWARP_TRACEBACK=1 shows where\n"
+    assert capfd.readouterr().err == said

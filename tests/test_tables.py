@@ -5,13 +5,22 @@ After a change that is meant: `FLUIDWARP_GOLDEN=write pytest tests/test_tables.p
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass
+from importlib import import_module
 from inspect import signature
 from itertools import product
 from pathlib import Path
+from pkgutil import walk_packages
 from typing import Any
 
+from pydantic import BaseModel
+
+import app.media
+import app.model
+import app.ui
+import app.work
 import solver
 from app.media import clip, encoders, formats
 from app.model import presets, tools
@@ -20,7 +29,8 @@ from app.ui.preferences import Preferences
 from app.work.jobs import MapOutput, Outputs
 from support.golden import GOLDEN, WRITES
 
-FILE = GOLDEN / "tables.txt"
+FILE, DEFAULTS = GOLDEN / "tables.txt", GOLDEN / "defaults.txt"
+PLACES = re.compile(r" at 0x[0-9a-f]+")  # in memory
 
 
 def told(value: Any) -> str:
@@ -72,6 +82,33 @@ def rows() -> Iterator[str]:
         for called, what in ((name, one), *((f"{name}.{part}", getattr(one, part)) for part in methods)):
             if callable(what) and (given := defaults(what)):
                 yield f"{called}: {given}"
+
+
+def offered() -> Iterator[tuple[str, Any]]:
+    """What the modules of the rooms offer one another, with its methods."""
+    rooms = [app.model, app.media, app.work, app.ui]
+    names = sorted(
+        one.name for room in rooms for one in walk_packages(room.__path__, f"{room.__name__}.") if not one.ispkg
+    )
+    for name in names:
+        for part, one in sorted(vars(import_module(name)).items()):
+            if getattr(one, "__module__", "") == name and not part.startswith("_") and callable(one):
+                yield f"{name}.{part}", one
+                methods = vars(one).items() if isinstance(one, type) and not issubclass(one, BaseModel) else ()
+                yield from ((f"{name}.{part}.{key}", value) for key, value in methods if not key.startswith("_"))
+
+
+def test_what_need_not_be_given_is_as_it_is_written_down() -> None:
+    """Recipes have a file of their own; what is made anew each time is told as that."""
+    found = []
+    for name, one in offered():
+        called = getattr(one, "__func__", one)
+        is_of_a_recipe = isinstance(one, type) and issubclass(one, BaseModel)
+        if callable(called) and not is_of_a_recipe and (given := defaults(called)):
+            found.append(f"{name}: {PLACES.sub('', given)}")
+    if WRITES:
+        DEFAULTS.write_text("\n".join(found) + "\n", "utf-8")
+    assert found == DEFAULTS.read_text("utf-8").splitlines()
 
 
 def test_the_tables_are_as_they_are_written_down() -> None:

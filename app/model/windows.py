@@ -136,8 +136,8 @@ def _holds(window: FlowWindow, lattice: tuple[int, int], room: list[float], pict
     """True if the box `room` (left, top, right, bottom) lies in the window."""
     h = _spacing(lattice, picture)
     for axis, (first, count) in enumerate(zip(window[1:], _size(lattice), strict=True)):
-        before = first == 0 or room[axis] >= first * h[axis]
-        if not (before and (first + count == lattice[axis] or room[2 + axis] <= (first + count) * h[axis])):
+        after = first + count == lattice[axis] or room[2 + axis] <= (first + count) * h[axis]
+        if not (room[axis] >= first * h[axis] and after):
             return False
     return True
 

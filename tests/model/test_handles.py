@@ -6,10 +6,11 @@ import math
 import re
 from typing import Any
 
+import numpy as np
 import pytest
 
 from app.errors import UserError
-from app.model.handles import RecipeHandle, RecipePin, heading, labelled, objections
+from app.model.handles import LONGEST_LINE, RecipeHandle, RecipePin, heading, labelled, objections
 from app.model.recipe import Recipe
 from app.model.schema import frozen
 
@@ -123,6 +124,36 @@ def test_how_near_two_handles_may_lie_and_be_led() -> None:
     assert pair(0.5, (0.5, 0.5), 0.58, (0.521, 0.5)) == []
     assert pair(0.5, (0.58, 0.5), 0.58, (0.5, 0.51)) == ["cross each other's way"]
     assert pair(0.5, (0.5, 0.58), 0.58, (0.5, 0.5)) == []
+
+
+@pytest.mark.parametrize("closed", [False, True])
+def test_a_long_line_reaches_as_far_as_a_part_of_its_length_and_an_outline_has_one_side_more(closed: bool) -> None:
+    corners, to = [[0.1, 0.1], [0.5, 0.1], [0.5, 0.2]], [0.6, 0.8]
+    length = 0.4 + 0.1 + math.hypot(0.4, 0.1) * closed
+    led = RecipeHandle.model_validate(frozen({"points": corners, "to": to, "closed": closed, "radius": 0.01}))
+    far = re.search(r"as far as it reaches, of ([\d.]+) to its goal", " ".join(objections([led], [], (1.0, 1.0))))
+    assert far is not None
+    goal = np.add(corners, np.subtract(to, led.at))
+    assert float(far[1]) == pytest.approx(np.hypot(*(goal - corners).T).max() / (length / LONGEST_LINE), rel=5e-3)
+
+
+def test_who_crosses_whose_way_is_told_as_they_come_near_at_some_moment() -> None:
+    """Of two at random, each going straight to its goal, at 1,001 moments: nearer than a quarter of what they were."""
+    dice, said = np.random.default_rng(5), 0
+    moments = np.linspace(0, 1, 1001)[:, None]
+    for _ in range(400):
+        (at, to, other, other_to) = 0.5 + dice.uniform(-0.06, 0.06, (4, 2))
+        one, two = handle(at=at.tolist(), to=to.tolist()), handle(at=other.tolist(), to=other_to.tolist())
+        told = " ".join(objections([one, two], [], (1.0, 1.0)))
+        far, after = math.dist(at, other), math.dist(to, other_to)
+        nearest = np.hypot(*((1 - moments) * (at - other) + moments * (to - other_to)).T).min()
+        close = min(far, 0.1)
+        if far < 0.005 or abs(4 * nearest - close) < 1e-3 or "apart" in told or "nearly" in told:
+            continue
+        assert after * 4 >= close
+        assert ("cross each other's way" in told) == (4 * nearest < close)
+        said += 4 * nearest < close
+    assert said > 20
 
 
 def test_a_handle_goes_two_radii_at_most() -> None:

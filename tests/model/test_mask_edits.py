@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 from scipy import ndimage
 
 from app.errors import UserError
@@ -193,3 +194,12 @@ def test_a_recipe_with_masks_is_read_as_it_was_written() -> None:
         Recipe.parse(text.replace("amount = 1.0", "amount = 2.0"))
     with pytest.raises(UserError, match="tool"):
         Recipe.parse(text.replace('"freeze"', '"push"'))
+
+
+def test_a_hand_paints_for_an_hour_at_most_whenever_it_begins() -> None:
+    def painted(ticks: int) -> MaskStroke:
+        return MaskStroke(kind="stroke", tool="freeze", samples=((500, 0.1, 0.1, 1.0), (500 + ticks, 0.2, 0.1, 1.0)))
+
+    assert painted(216_000).last_tick == 216_500
+    with pytest.raises(ValidationError, match="paints for 216001 ticks of the hand; at most 216000, an hour, work"):
+        painted(216_001)

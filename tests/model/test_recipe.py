@@ -258,6 +258,51 @@ def test_what_must_not_go_beyond_another_may_be_the_same(text: str):
     Recipe.parse(text)
 
 
+@pytest.mark.parametrize(
+    ("table", "kinds"),
+    [
+        ("force", ("point", "curve", "field", "gradient", "vortex", "source", "sink")),
+        ("viscosity", ("constant", "picture", "path")),
+        ("freeze", ("constant", "picture", "path")),
+    ],
+)
+def test_of_a_kind_that_there_is_not_all_are_told_that_there_are(table: str, kinds: tuple[str, ...]):
+    all_of_them = f"a.toml, line 1: {table}[1]: 'kind' must be one of {', '.join(map(repr, kinds))}"
+    for text, more in (("kind = 'whirl'", ", not 'whirl'"), ("", "")):
+        with pytest.raises(UserError) as caught:
+            Recipe.parse(f"[[{table}]]\n{text}", "a.toml")
+        assert str(caught.value) == all_of_them + more
+
+
+def test_of_several_faults_one_is_told_and_how_many_more_there_are():
+    """A key that is not known comes first, as another may lack for it."""
+    faults = ("duration = 0", "edges = 3", "picutre = 'a.png'")
+    first = "a.toml, line 1: 'duration' must be greater than 0, not 0"
+    known = "unknown key 'picutre'; did you mean 'picture'?"
+    wanted = (first, f"{first} (1 more after this one)", f"a.toml, line 3: {known} (2 more after this one)")
+    for count, said in enumerate(wanted, 1):
+        with pytest.raises(UserError) as caught:
+            Recipe.parse("\n".join(faults[:count]), "a.toml")
+        assert str(caught.value) == said
+
+
+@pytest.mark.parametrize(
+    ("key", "part"),
+    [
+        ("stroke", {"tool": "push", "samples": ((0, 0.1, 0.1, 1.0),)}),
+        ("change", {"tick": 3, "drag": 1.0}),
+        ("force", {"kind": "vortex", "point": (0.5, 0.5)}),
+        ("handle", {"at": (0.5, 0.5), "to": (0.6, 0.5)}),
+        ("mask", {"kind": "invert", "tick": 3, "of": "frozen"}),
+    ],
+)
+def test_a_recording_is_as_long_as_its_recipe_once_anything_is_done_in_it(key: str, part: dict[str, object]):
+    """What is painted on masks before the first tick takes no time, and a pin does nothing by itself."""
+    assert Recipe.model_validate({"duration": 2.0, key: (part,)}).recorded == 120
+    still = {"mask": ({"kind": "invert", "tick": 0, "of": "frozen"},), "pin": ({"at": (0.5, 0.5)},)}
+    assert Recipe.model_validate({"duration": 2.0} | still).recorded == 0
+
+
 def test_a_mark_before_the_text_is_read_over(tmp_path: Path):
     """As Windows' Notepad sets it."""
     (tmp_path / "a.toml").write_text("duration = 2.0\n", "utf-8-sig")

@@ -157,6 +157,23 @@ def test_energy_is_summed_block_by_block(device: Device, partial: bool) -> None:
         assert found[row, column] == pytest.approx([squares[block].sum(), departed[block].sum()], rel=1e-5)
 
 
+def test_the_energy_that_departs_counts_open_faces_by_their_parts(device: Device) -> None:
+    """Of 12 x 8 cells. A texel of what is carried has two columns of two rows, of which the next has one again."""
+    faces = RNG.standard_normal((2, 14, 17)).astype(np.float32)  # from two columns and rows before the first
+    u, v = (np.stack([part[y::2, x : x + 16] for y in (0, 1) for x in (0, 1)], axis=-1) for part in faces)
+    left, up = RNG.random((2, 4, 6, 4)).astype(np.float32)
+    opened = RNG.integers(0, 4, (6, 8, 4)).astype(np.uint8)  # 1 for u, 2 for v
+    targets = device.field((8, 6), 4), device.field((8, 6), 4), device.field((8, 6), 1)
+    given = {"blocks_u": u, "blocks_v": v, "left": left, "up": up, "open": opened, "trace": np.zeros((8, 12, 2), "f4")}
+    uploaded: dict[str, Any] = {name: device.upload(value) for name, value in given.items()}
+    device.pass_("step/advect.frag", PARTIAL=1)(targets, decay=1.0, **uploaded)
+    inside, own = opened[1:-1, 1:-1], (slice(1, 5), slice(2, 14, 2))
+    wanted = (left * (inside % 2) * u[own] ** 2 + up * (inside // 2) * v[own] ** 2).sum(axis=-1)
+    np.testing.assert_allclose(targets[2].get()[1:-1, 1:-1], wanted, rtol=1e-4)
+    # What does not move stays, but for what is closed.
+    np.testing.assert_allclose(targets[0].get()[1:-1, 1:-1], u[own] * (inside % 2), atol=1e-5)
+
+
 def test_the_paper_s_divergence_and_pressure_are_central_differences(device: Device) -> None:
     """Beyond an edge the normal velocity is odd, and the pressure even."""
     velocity, pressure, source, wanted = (RNG.standard_normal((12, 20, n)).astype(np.float32) for n in (2, 1, 1, 1))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -49,6 +50,36 @@ def test_trace_and_advect(device: Device, nx: int, ny: int, walls: Walls, couran
     assert (after[:, 0, 0] == 0).all()
     assert (after[0, :, 1] == 0).all()
     fluid.release()
+
+
+CHANGES: dict[str, Callable[[Fluid], object]] = {
+    "add_force": lambda fluid: fluid.add_force(lambda x, y, t: (5 * x * y, -5 * x * y), 0.3),
+    "advect": lambda fluid: fluid.advect(0.1),
+    "diffuse": lambda fluid: fluid.diffuse(0.1),
+    "project": lambda fluid: fluid.project(),
+    "step": lambda fluid: fluid.step(0.1),
+    "set_velocity": lambda fluid: fluid.set_velocity(lambda x, y, t: (np.sin(9 * y), 0 * x)),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_after_every_change_the_trace_and_the_strain_are_of_the_velocity_as_it_is_then(
+    device: Device, change: str
+) -> None:
+    grid = Grid(24, 16)
+    fluid, fresh = Fluid(device, grid), Fluid(device, grid)
+    fluid.set_viscosity(0.05)
+    fluid.set_velocity(reference.smooth_velocity(24, 16, seed=2, cells=10))
+    before, strain = fluid.trace(0.05).get(), fluid.strain(0.05)
+    CHANGES[change](fluid)
+    fresh.set_velocity(fluid.velocity.read.get())
+    found = fluid.trace(0.05).get()
+    assert relative(found, fresh.trace(0.05).get()) < 1e-6
+    assert relative(found, before) > 1e-3
+    assert fluid.strain(0.05) == pytest.approx(fresh.strain(0.05), rel=1e-5)
+    assert fluid.strain(0.05) != pytest.approx(strain, rel=1e-4)
+    fluid.release()
+    fresh.release()
 
 
 def test_add_force_and_source(device: Device) -> None:

@@ -12,6 +12,7 @@ from solver.gl.device import Device
 from solver.packing import packed, unpacked
 from solver.params import NoSlip
 from solver.viscosity.clusters import ClusterMatrix
+from solver.viscosity.conjugate_gradients import cg_coefficients
 from solver.viscosity.multigrid import Multigrid
 from solver.viscosity.plan import Plan
 
@@ -110,3 +111,23 @@ def test_clusters_are_solved_directly(seed: int) -> None:
     solver = ClusterMatrix(connected_components(each, one, other), strip, rows, columns, np.append(values, 0.5 * own))
     rhs = rng.normal(size=count)
     assert np.allclose(matrix @ solver.solve(rhs), rhs, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("numbers", "wanted"),
+    [
+        ((6.0, 2.0, 0.0, 0.0), (3.0, 0.0, 2.0)),  # the first direction is z itself
+        ((6.0, 2.0, -1.0, 4.0), (6.0 / 1.75, 0.25, 1.75)),  # p . A p = z . A z + beta z . A p_before
+        ((6.0, 2.0, 1.0, -4.0), (3.0, 0.0, 2.0)),
+        ((6.0, 1.0, 1.0, 1.0), (0.0, 0.0, 0.0)),  # all of z has been in the direction before
+        ((6.0, 1.0, 1.0, 1.0 / (1 - 2e-6)), (6.0 / 2e-6, -(1 - 2e-6), 2e-6)),
+        ((6.0, 1.0, 1.0, 1.0 / (1 - 5e-7)), (0.0, 0.0, 0.0)),
+        ((float("nan"), 2.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
+        ((float("inf"), 2.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
+        ((6.0, float("nan"), 0.0, 0.0), (0.0, 0.0, 0.0)),
+        ((6.0, float("inf"), 0.0, 0.0), (0.0, 0.0, 0.0)),
+        ((0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
+    ],
+)
+def test_a_direction_of_which_rounding_leaves_nothing_is_none(numbers: tuple[float, ...], wanted: tuple) -> None:
+    assert cg_coefficients(*numbers) == pytest.approx(wanted)

@@ -13,8 +13,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from app.errors import UserError
 from app.media import project as projects
 from app.media.pictures import read_picture, write_picture
+from app.model.picture import Picture
 from app.ui import clipboard
 from app.ui.preferences import Preferences
 from app.ui.saving import SaveDialog
@@ -102,6 +104,45 @@ def robot(device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> It
 
 
 @pytest.mark.parametrize("chord", ["ctrl+c", "ctrl+v"])
+class Board:
+    """The system's clipboard, as copykitten has it: 8 bits of red, green, blue and alpha."""
+
+    CopykittenError = OSError
+
+    def __init__(self) -> None:
+        self.held: tuple[bytes, int, int] | None = None
+
+    def copy_image(self, data: bytes, width: int, height: int, detach: bool) -> None:
+        assert detach == (sys.platform == "linux")
+        self.held = data, width, height
+
+    def paste_image(self) -> tuple[bytes, int, int]:
+        if self.held is None:
+            raise OSError("nothing")
+        return self.held
+
+
+@pytest.mark.parametrize("channels", [1, 2, 3, 4])
+def test_any_picture_is_copied_with_alpha_and_pasted_without_where_it_is_opaque(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, channels: int
+) -> None:
+    board = Board()
+    monkeypatch.setitem(sys.modules, "copykitten", board)
+    with pytest.raises(UserError, match="There is no picture on the clipboard"):
+        clipboard.paste(tmp_path / "pasted.png")
+    pixels = np.random.default_rng(3).integers(0, 256, (3, 5, channels)).astype(np.uint8)
+    write_picture(tmp_path / "given.png", Picture(pixels))
+    clipboard.give(str(tmp_path / "given.png"))
+    assert board.held is not None
+    colours = pixels[..., : 3 if channels > 2 else 1] + np.zeros((3, 5, 3), np.uint8)
+    alpha = pixels[..., -1:] if channels in (2, 4) else np.full((3, 5, 1), 255, np.uint8)
+    wanted = np.concatenate([colours, alpha], axis=-1)
+    assert board.held == (wanted.tobytes(), 5, 3)
+    clipboard.paste(tmp_path / "pasted.png")
+    found = read_picture(tmp_path / "pasted.png").pixels
+    np.testing.assert_array_equal(found, wanted if channels in (2, 4) else colours)
+
+
 def test_without_copykitten_a_sentence_says_how_to_get_it(robot: Robot, chord: str) -> None:
     robot.key(chord)
     robot.frame()

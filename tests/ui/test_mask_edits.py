@@ -36,19 +36,21 @@ def test_a_mask_that_the_tool_shows_anyway_turns_on_no_overlay(robot: Robot, too
     assert robot.editor.state.shows_frozen
 
 
-@pytest.mark.parametrize("tool", ["", "freeze", "push"])
+@pytest.mark.parametrize("tool", ["", "mask", "freeze", "push"])
 def test_the_hint_of_a_margin_goes_once_something_is_frozen(
     robot: Robot, tool: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Also if the fluid moved meanwhile, or the recipe froze it."""
+    """Also if the fluid moved meanwhile or did not, or the recipe froze it."""
     said, text = list[str](), Ui.text
     monkeypatch.setattr(
         Ui, "text", lambda ui, words, *more, **named: (said.append(words), text(ui, words, *more, **named))
     )
     path = {"kind": "path", "points": ((0.2, 0.2),), "radius": 0.1}
     stroke = {"tool": tool, "samples": ((0, 0.2, 0.2, 1.0), (3, 0.3, 0.2, 1.0))}
-    made = Recipe.model_validate({"stroke": (stroke,)} if tool else {"freeze": (path,)})
-    robot.editor.session.edit("Made", stroke=made.stroke, freeze=made.freeze)
+    still = {"kind": "fill", "tick": 0, "of": "frozen", "amount": 1.0}
+    given = {"mask": (still,)} if tool == "mask" else {"stroke": (stroke,)} if tool else {"freeze": (path,)}
+    made = Recipe.model_validate(given)
+    robot.editor.session.edit("Made", stroke=made.stroke, freeze=made.freeze, mask=made.mask)
     robot.key("f")
     said.clear()
     robot.frame()

@@ -618,6 +618,23 @@ def test_states_of_another_driver_or_version_of_it_are_not_taken(
             replay.release()
 
 
+def test_a_state_is_kept_every_64_ticks_and_at_the_end(device: Device, folder: Path):
+    still = Recipe.parse("duration = 10\nfluid = { grid = 8 }\n")
+    replay = Replay(device, still, Pictures(read_picture(folder / "p0.png")), budget=0)
+    kept = states.StoredStates(folder / "states", replay, pytest.fail)
+    for _ in range(130):
+        kept.keep()
+        replay.advance()
+    kept.keep(last=True)
+    assert sorted(int(path.name[-17:-10]) for path in (folder / "states").iterdir()) == [64, 128, 130]
+    for wanted, found in ((63, None), (127, 64), (129, 128), (200, 130)):
+        other = Replay(device, still, Pictures(read_picture(folder / "p0.png")), budget=0)
+        assert states.StoredStates(folder / "states", other, pytest.fail).resume(wanted) == (found is not None)
+        assert other.tick == (found or 0)
+        other.release()
+    replay.release()
+
+
 def newest(folder: Path) -> Path:
     return max(folder.iterdir(), key=lambda path: path.stat().st_mtime)
 

@@ -589,6 +589,17 @@ def test_a_change_waits_behind_the_strokes_too(session: Session, settings: dict)
     assert np.array_equal(session.replay.warp.read(), seen)
 
 
+def test_what_wakes_on_its_way_to_a_moment_still_goes_there(session: Session) -> None:
+    strike(session, 0)
+    session.settle()
+    for tick in (0, 3, session.end):
+        session.seek(tick)
+        session.release_gpu()  # before it has got there
+        session.wake()
+        session.settle()
+        assert session.tick == session.replay.tick == tick
+
+
 def test_a_stroke_held_while_others_wait_lasts_as_long_as_it_was_held(session: Session) -> None:
     for number in range(3):
         strike(session, number)
