@@ -122,7 +122,7 @@ class Handle(Course):
         for name in ("points", "goals"):
             line = getattr(self, name)
             check_type("a line of a handle", line, Sequence | np.ndarray)
-            object.__setattr__(self, name, tuple(map(tuple, places(line).tolist())) if len(line) else ())
+            object.__setattr__(self, name, tuple(map(tuple, places(line).tolist())) if np.size(line) else ())
         if self.points and len(set(self.points)) < 2 + self.closed:
             raise ValueError(f"a line of a handle has {2 + self.closed} different points or more")
         if self.goals and len(self.goals) != len(self.points):

@@ -49,6 +49,7 @@ STRETCHING, TORN = 8.0, 12.0
 # Seconds in which a handle halves the way it has left, or it lets go: with nothing in its way a fiftieth is left then.
 PATIENCE = 4 / RATE
 CORE = 0.5  # of the radius of what turns or swells, where it does so evenly
+NO_TIME = 1e-38  # seconds: less is none in 32 bits
 FOUND = 1e-7  # longer sides, as places are rounded
 LOST = 1e-4  # longer sides that are left where a handle's place is not found
 
@@ -134,7 +135,7 @@ class Handles:
         handles: their number is that in the list, from 0.
     """
 
-    def __init__(self, fluid: Scheme, warp: WarpMap, handles: Sequence[Handle]) -> None:
+    def __init__(self, fluid: Scheme, warp: WarpMap, handles: Iterable[Handle]) -> None:
         check_type("what handles move", fluid, Scheme)
         check_type("what handles look at", warp, WarpMap)
         self._fluid, self._warp, self._forward = fluid, warp, ForwardMap(warp)
@@ -151,13 +152,14 @@ class Handles:
         self._sought: tuple[object, np.ndarray] | None = None  # where they are, and what that was found from
         self.replace(handles)
 
-    def replace(self, handles: Sequence[Handle]) -> None:
+    def replace(self, handles: Iterable[Handle]) -> None:
         """Go on with other handles; those that have begun keep their number."""
         check_type("what is led", handles, Iterable)
+        handles = tuple(handles)
         for handle in handles:
             check_type("a handle", handle, Handle)
         known = {id(shape.handle): shape for shape in self._shapes}
-        self.handles, cell = tuple(handles), max(self._fluid.grid.spacing)
+        self.handles, cell = handles, max(self._fluid.grid.spacing)
         self._shapes = [known.get(id(handle)) or Shape.of(handle, self._warp.extent, cell) for handle in handles]
         before, self._counts = self._counts, np.array([len(shape.led) for shape in self._shapes], int)
         self._rows = _runs(self._counts)
@@ -187,7 +189,7 @@ class Handles:
 
     def lead(self, dt: float, time: float) -> None:
         """Before a step at a time: find where the handles are and shall go, and add what the fluid lacks of that."""
-        if not check_step(dt) > 0:
+        if (dt := check_step(dt)) < NO_TIME:
             raise ValueError("to lead a handle takes some time")
         shapes, self._lead = self._shapes, None
         begun = np.array([each.is_in_picture and each.handle.start <= time + dt / 2 for each in shapes], bool)

@@ -9,6 +9,7 @@ import sys
 import warnings
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from fractions import Fraction
 from pathlib import Path
 from typing import Any, cast
 
@@ -193,6 +194,11 @@ WRONG: dict[str, tuple[Callable[[Any], object], str]] = {
         lambda fluid: Handles(fluid, WarpMap(fluid.device, fluid.grid), [Handle((0.3, 0.3), (0.4, 0.3))]).advance(0.0),
         "time",
     ),
+    "handles led in next to no time": (
+        lambda fluid: Handles(fluid, WarpMap(fluid.device, fluid.grid), [Handle((0.3, 0.3))]).advance(5e-324),
+        "time",
+    ),
+    "a line of a number": (lambda fluid: Handle((0.3, 0.3), points=cast(Any, np.array(0.1))), "shape"),
     "a picture at an unknown quality": (lambda fluid: Sampling(quality=cast(Any, "best")), "quality"),
     "three samples": (lambda fluid: Sampling(samples=3), "samples"),
     "a picture at no size": (
@@ -527,6 +533,15 @@ def test_what_is_of_no_use_is_told_in_a_sentence(device: Device, kind: type[Flui
     assert np.array_equal(fluid.velocity_at_centres(), still)
     for item in (fluid, warp, own):
         item.release()
+
+
+def test_handles_may_come_one_by_one_and_a_step_be_a_fraction(fluid: Any) -> None:
+    warp = WarpMap(fluid.device, fluid.grid)
+    handles = Handles(fluid, warp, (Handle((x, 0.3), (x, 0.35)) for x in (0.3, 0.6)))
+    assert len(handles.handles) == 2
+    handles.advance(cast(Any, Fraction(1, 50)))
+    assert np.abs(warp.read()).max() > 0
+    warp.release()
 
 
 def test_a_function_may_work_in_place_and_give_the_same_arrays_again(device: Device) -> None:
