@@ -462,6 +462,25 @@ def test_an_exported_animation_is_what_is_asked_for(robot: Robot, dialog: Export
     assert (job.recipe.output.fps, job.recipe.time.start, job.recipe.time.end) == pytest.approx((24, 0.1, 0.2))
 
 
+def test_what_plays_stands_still_behind_the_dialog_of_the_export(robot: Robot) -> None:
+    """A picture is of the moment at which the dialog was asked for, and not of a later one."""
+    session = robot.editor.session
+    robot.drag((0.3, 0.5), (0.6, 0.5), steps=8)
+    robot.rest()
+    robot.key("home")
+    robot.key("space")
+    robot.frame(count=6)
+    assert session.playing
+    robot.key("ctrl+e")
+    moment = session.tick
+    assert 0 < moment < session.end
+    robot.frame(count=6)
+    dialog = robot.editor.dialogs.shown[-1]
+    assert isinstance(dialog, ExportDialog)
+    assert session.tick == moment
+    assert not session.is_moving
+
+
 def test_an_animation_ends_where_the_recording_does_that_goes_on_behind_the_dialog(
     robot: Robot, widgets: Widgets, monkeypatch: pytest.MonkeyPatch
 ) -> None:
