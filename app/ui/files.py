@@ -231,7 +231,7 @@ class Files:
         self._loading = None
         if loading.error:
             self._leave(loading)
-            self.messages.warn(loading.error)
+            self._warn(loading, loading.error)
         elif workspace.is_dirty and workspace.session.document.recipe is not loading.recipe:
             self.unless_unsaved(f"open {loading.name}", lambda: self._show(loading))
         else:
@@ -243,7 +243,7 @@ class Files:
             self.show(loading.project, loading.pixels, loading.found)
         except UserError as error:
             self._leave(loading)
-            self.messages.warn(error.in_window)
+            self._warn(loading, error.in_window)
             return
         self.preferences.opened(loading.path)
         session = self.workspace.session
@@ -257,6 +257,11 @@ class Files:
         else:
             name = loading.project.recipe.picture
             self.messages.warn(f"All strokes are restored, but {name} is not the picture that they were made on.")
+
+    def _warn(self, loading: Loading, error: str) -> None:
+        """Tell why it is not open: of what a person has chosen, until something else is."""
+        session = self.workspace.session
+        self.messages.warn(error, lambda: loading.found is not None or self.workspace.session is session)
 
     @staticmethod
     def _leave(loading: Loading) -> None:

@@ -604,6 +604,10 @@ def test_files_that_are_no_pictures_leave_the_work_alone(robot: Robot, tmp_path:
         assert name in robot.editor.messages.shown[-1].text, name
         assert robot.editor.session.recipe is recipe
     assert (tmp_path / "kept.fluidwarp").read_bytes() == whole
+    write_picture(tmp_path / "other.png", pattern())
+    robot.drop(tmp_path / "other.png")
+    robot.frame(count=2)
+    assert not robot.editor.messages.shown  # that something else could not be opened is of no interest any more
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="names are texts elsewhere")
