@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +41,7 @@ from app.ui.saving import SaveDialog
 from app.ui.viewport import Rect
 from app.ui.widgets import Ui
 from app.ui.workspace import Workspace
+from app.work.handle_status import FIT
 from app.work.recovery import Found
 
 OPENABLE = tuple(dict.fromkeys((*PICTURE_ENDINGS, *CLIP_ENDINGS, SUFFIX, ".toml", *MAP_ENDINGS, *ENDINGS)))
@@ -133,7 +135,13 @@ class Files:
     def _feel(self) -> dict[str, Any]:
         """What the person has set of the fluid; a recipe with forces of its own has been set by nobody here."""
         session = self.workspace.session
-        return {} if session.recipe.force else settings_of(session.recipe.fluid_at(session.tick))
+        feel = {} if session.recipe.force else settings_of(session.recipe.fluid_at(session.tick))
+        history = session.document.history
+        for before, entry in reversed([*pairwise(history.entries[: history.index + 1])]):
+            # What a fit has found is for the handles of this work.
+            if entry.name == FIT and feel.get("viscosity") == entry.recipe.fluid.viscosity:
+                feel["viscosity"] = before.recipe.fluid.viscosity
+        return feel
 
     def paste(self) -> None:
         """Open the picture that is on the clipboard, as a picture that is opened anew."""

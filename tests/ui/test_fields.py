@@ -134,6 +134,24 @@ def test_a_picture_that_is_opened_begins_with_the_fluid_as_it_is_now(
     assert robot.editor.session.recipe.fluid.viscosity == 1.25
 
 
+@pytest.mark.parametrize(("then", "wanted"), [(None, 0.02), (0.3, 0.3)])
+def test_a_picture_that_is_opened_does_not_begin_with_what_a_fit_has_found(
+    robot: Robot, widgets: Widgets, tmp_path: Path, then: float | None, wanted: float
+) -> None:
+    """That is for the handles of the work it was made of; what the person sets after it is not."""
+    session = robot.editor.session
+    session.change("Viscosity", viscosity=0.02)
+    for found in (0.007, 0.008):
+        session.edit("Fit", fluid=session.recipe.fluid.model_copy(update={"viscosity": found}))
+    if then is not None:
+        session.change("Viscosity", viscosity=then)
+    write_picture(tmp_path / "other.png", Picture(np.zeros((48, 64, 3), np.uint8)))
+    robot.drop(tmp_path / "other.png")
+    widgets.click("Don't save")
+    assert robot.editor.session.project.picture.width == 64
+    assert robot.editor.session.recipe.fluid.viscosity == wanted
+
+
 def test_edges_of_the_fluid_are_what_is_pressed(robot: Robot, widgets: Widgets) -> None:
     for words, walls in (("Edges hold", "no-slip"), ("Edges glide", "free-slip")):
         widgets.click(words)
