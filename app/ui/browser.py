@@ -46,7 +46,7 @@ class Browser(Dialog):
         self.writes = name is not None
         self._chosen = chosen
         self._selected: Path | None = None
-        self._confirm = False
+        self._replaces: Path | None = None  # what the person has been told is there already
         self.go(folder if os.path.isdir(folder) else Path.home())
 
     def go(self, folder: Path) -> None:
@@ -67,14 +67,8 @@ class Browser(Dialog):
         imgui.same_line()
         imgui.set_next_item_width(-1)
         entered, self.typed = imgui.input_text("##folder", self.typed, imgui.InputTextFlags_.enter_returns_true)
-        if entered:
-            typed = Path(self.typed).expanduser()
-            if os.path.isdir(typed):  # unlike Path's own, no error where a name is too long
-                self.go(typed)
-            elif os.path.exists(typed) or self.writes:
-                return not self._take(typed)
-            else:
-                self.problem = shown(f"There is no {typed}.")
+        if entered and not self._go_to_typed():
+            return False
         foot = ui.px(88 if self.writes else 48)
         imgui.begin_child("files", ImVec2(0, -foot))
         going: Path | None = None
@@ -88,15 +82,41 @@ class Browser(Dialog):
         imgui.end_child()
         if going is not None:
             self.go(going)
+        named = False
         if self.writes:
             imgui.set_next_item_width(-1)
-            entered, self.name = imgui.input_text("##name", self.name, imgui.InputTextFlags_.enter_returns_true)
-            done = done or entered
-        done = self._foot(ui) or done
-        if done:
-            target = (self.folder / self.name if self.name else None) if self.writes else self._selected
-            if target is not None:
-                return not self._take(target)
+            named, self.name = imgui.input_text("##name", self.name, imgui.InputTextFlags_.enter_returns_true)
+        pressed = self._foot(ui) or named
+        if pressed and self._is_typed:  # of a folder, where the name belongs
+            if not self._go_to_typed():
+                return False
+            done = self.writes and not self._is_typed and not self.problem
+        elif pressed and self._selected is not None and self._selected.is_dir():
+            self.go(self._selected)
+        else:
+            done = done or pressed
+        target = self._target
+        return target is None or not done or not self._take(target)
+
+    @property
+    def _is_typed(self) -> bool:
+        """Another path has been typed than that of the folder that is shown."""
+        return self.typed != printable(str(self.folder))
+
+    @property
+    def _target(self) -> Path | None:
+        """The file that is chosen in the folder that is shown."""
+        return (self.folder / self.name if self.name else None) if self.writes else self._selected
+
+    def _go_to_typed(self) -> bool:
+        """Show the folder that is typed, or hand the file over; False once that is done."""
+        typed = Path(self.typed).expanduser()
+        if os.path.isdir(typed):  # unlike Path's own, no error where a name is too long
+            self.go(typed)
+        elif os.path.exists(typed) or self.writes:
+            return not self._take(typed)
+        else:
+            self.problem = shown(f"There is no {typed}.")
         return True
 
     def _row(self, ui: Ui, path: Path, going: Path | None, done: bool) -> tuple[Path | None, bool]:
@@ -110,7 +130,9 @@ class Browser(Dialog):
         draw.add_text(ImVec2(corner.x + ui.px(30), corner.y + ui.px(5)), packed(ui.palette.text), printable(path.name))
         if picked:
             twice = imgui.is_mouse_double_clicked(0)
+            self.typed = printable(str(self.folder))  # what is picked counts now
             if path.is_dir():
+                self._selected = None if self.writes else path
                 return (path if twice else going), done
             self._selected = path
             if self.writes:
@@ -119,20 +141,23 @@ class Browser(Dialog):
         return going, done
 
     def _foot(self, ui: Ui) -> bool:
-        label = "Replace" if self._confirm else self.title.split()[0]
-        if self._confirm:
-            ui.text(f"{self.name} is there already.", ui.palette.accent, 14)
+        typed = Path(self.typed).expanduser() if self._is_typed else self._target
+        asks = typed is not None and typed == self._replaces
+        label = "Replace" if asks else self.title.split()[0]
+        if typed is not None and asks:
+            ui.text(f"{printable(typed.name)} is there already.", ui.palette.accent, 14)
             imgui.same_line()
         imgui.set_cursor_pos_x(imgui.get_window_width() - ui.px(204))
         if ui.button("Cancel", width=88):
             self.close()
         imgui.same_line()
-        return ui.button(label, primary=True, width=88)
+        with ui.enabled(self._is_typed or self._target is not None):
+            return ui.button(label, primary=True, width=88)
 
     def _take(self, path: Path) -> bool:
         """Hand the file over; False where that fails, or the person has to say first that it may be replaced."""
-        if self.writes and os.path.exists(path) and not self._confirm:
-            self._confirm = True
+        if self.writes and os.path.exists(path) and path != self._replaces:
+            self._replaces = path
             return False
         return self.attempt(lambda: self._chosen(path))
 

@@ -168,6 +168,8 @@ class Commands:
     def ask_export(self) -> None:
         session = self.workspace.session
         session.release()
+        if session.playing and not session.coasting:  # a picture is of the moment that was seen
+            session.pause()
         self.dialogs.show(ExportDialog(session, self.exports, self.chooser, self.preferences))
 
     def ask_quit(self) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +41,7 @@ from app.ui.saving import SaveDialog
 from app.ui.viewport import Rect
 from app.ui.widgets import Ui
 from app.ui.workspace import Workspace
+from app.work.handle_status import FIT
 from app.work.recovery import Found
 
 OPENABLE = tuple(dict.fromkeys((*PICTURE_ENDINGS, *CLIP_ENDINGS, SUFFIX, ".toml", *MAP_ENDINGS, *ENDINGS)))
@@ -133,7 +135,13 @@ class Files:
     def _feel(self) -> dict[str, Any]:
         """What the person has set of the fluid; a recipe with forces of its own has been set by nobody here."""
         session = self.workspace.session
-        return {} if session.recipe.force else settings_of(session.recipe.fluid_at(session.tick))
+        feel = {} if session.recipe.force else settings_of(session.recipe.fluid_at(session.tick))
+        history = session.document.history
+        for before, entry in reversed([*pairwise(history.entries[: history.index + 1])]):
+            # What a fit has found is for the handles of this work.
+            if entry.name == FIT and feel.get("viscosity") == entry.recipe.fluid.viscosity:
+                feel["viscosity"] = before.recipe.fluid.viscosity
+        return feel
 
     def paste(self) -> None:
         """Open the picture that is on the clipboard, as a picture that is opened anew."""
@@ -231,7 +239,7 @@ class Files:
         self._loading = None
         if loading.error:
             self._leave(loading)
-            self.messages.warn(loading.error)
+            self._warn(loading, loading.error)
         elif workspace.is_dirty and workspace.session.document.recipe is not loading.recipe:
             self.unless_unsaved(f"open {loading.name}", lambda: self._show(loading))
         else:
@@ -243,7 +251,7 @@ class Files:
             self.show(loading.project, loading.pixels, loading.found)
         except UserError as error:
             self._leave(loading)
-            self.messages.warn(error.in_window)
+            self._warn(loading, error.in_window)
             return
         self.preferences.opened(loading.path)
         session = self.workspace.session
@@ -257,6 +265,11 @@ class Files:
         else:
             name = loading.project.recipe.picture
             self.messages.warn(f"All strokes are restored, but {name} is not the picture that they were made on.")
+
+    def _warn(self, loading: Loading, error: str) -> None:
+        """Tell why it is not open: of what a person has chosen, until something else is."""
+        session = self.workspace.session
+        self.messages.warn(error, lambda: loading.found is not None or self.workspace.session is session)
 
     @staticmethod
     def _leave(loading: Loading) -> None:

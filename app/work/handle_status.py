@@ -164,6 +164,12 @@ def unmet(replay: Replay, within: float, is_fitted: bool = False) -> Iterator[Un
             yield Unmet(label, said, helped)
 
 
+def is_awaited(replay: Replay) -> bool:
+    """One comes nearer to where it is led, however slowly, and has not let go of it; reads back from the GPU."""
+    handles = replay.handles
+    return any(far > ARRIVED and halt == "late" for far, halt in zip(handles.away, handles.halts, strict=True))
+
+
 def _nearest_of(solid: np.ndarray, replay: Replay, places: np.ndarray) -> float:
     """How far the nearest solid cell is from any of these places, longer sides; infinite where none is solid."""
     rows, columns = np.nonzero(solid)

@@ -7,6 +7,7 @@ import time
 from app.errors import UserError
 from app.media.project import Project
 from app.work.editing import Editing
+from app.work.handle_status import is_awaited
 from solver.gl.device import Device
 
 LOOK_EVERY = 5  # ticks between two looks at whether the fluid is at rest; each waits for the GPU
@@ -182,7 +183,7 @@ class Playing(Editing):
         self._coasted += 1
         if self._coasted % LOOK_EVERY:
             return
-        if not self._is_fast() or self._coasted * self.dt > MOST_COASTING:
+        if not (self._is_fast() or is_awaited(self.replay)) or self._coasted * self.dt > MOST_COASTING:
             self.coasting, self.playing = False, self._plays_on
             self.replay.checkpoint()
             self.changes += 1

@@ -6,12 +6,15 @@ from typing import Any
 
 import numpy as np
 
+from solver.gl.passes import Region
 from solver.gl.points import draw_at
 from solver.limits import places
 from solver.warp.map import WarpMap
 from solver.warp.scaled import ScaledMap
 
 MOST_ALONG = 1024  # texels along a side of the first guess
+ROUNDS = 16  # of Newton's method, in warp/invert.frag
+AROUND = 4  # texels that the cubic reads around a place, and more for what is rounded
 
 
 class ForwardMap:
@@ -37,6 +40,7 @@ class ForwardMap:
         size = self._warp.coarse_size if size is None else size
         field = self._warp.device.field(size, 2, "forward map, to read")
         invert = self._warp.device.pass_("warp/invert.frag")
+        self._find_guess()
         invert(field, **self._inputs(), origin=(0.0, 0.0), step=field.texel)
         displacement = field.get()
         field.release()
@@ -44,7 +48,10 @@ class ForwardMap:
 
     def at(self, points: np.ndarray) -> np.ndarray:
         """The displacement F at points (n, 2) of the original, in longer sides: float32 (n, 2)."""
-        return draw_at(self._warp.device, places(points), self._warp.extent, "warp/invert.frag", **self._inputs())
+        points = places(points)
+        self._find_guess()
+        inputs = self._inputs(self._regions(points))
+        return draw_at(self._warp.device, points, self._warp.extent, "warp/invert.frag", **inputs)
 
     def release(self) -> None:
         """Free the texture."""
@@ -56,7 +63,11 @@ class ForwardMap:
     def __exit__(self, *_: object) -> None:
         self.release()
 
-    def _inputs(self) -> dict[str, Any]:
+    def _inputs(self, regions: list[Region] | None = None) -> dict[str, Any]:
+        displacement = self._warp.composed(exact=True, regions=regions)
+        return {"displacement": displacement, "guess": self._guess, "extent": self._warp.extent}
+
+    def _find_guess(self) -> None:
         warp = self._warp
         if self._guessed != warp.version:
             self._guess.clear()
@@ -66,7 +77,29 @@ class ForwardMap:
                 self._guess, triangles=(0, 6 * cells), displacement=warp.composed(self._guess.size), extent=warp.extent
             )
             self._guessed = warp.version
-        return {"displacement": warp.composed(exact=True), "guess": self._guess, "extent": warp.extent}
+
+    def _regions(self, points: np.ndarray) -> list[Region] | None:
+        """The texels of the map among which Newton's method finds these points; None if they may be half of it."""
+        extent, size, guesses = np.array(self._warp.extent), np.array(self._warp.size), np.array(self._guess.size)
+        reach = ROUNDS * np.sqrt(0.5) * np.hypot(*(extent / guesses))  # no round goes farther
+        least = 2 * np.ceil(reach / extent * size) + 2 * AROUND
+        if 2 * len(points) * np.prod(least) >= np.prod(size):
+            return None
+        guess = self._guess.get()
+        corner = np.floor(points / extent * guesses - 0.5).astype(int)
+        # Those that a point lies between, and one more each way as it may be rounded.
+        steps = np.mgrid[-1:3, -1:3].reshape(2, -1).T
+        near = np.clip(corner + steps[:, None], 0, guesses - 1)
+        starts = points + guess[near[..., 1], near[..., 0]]
+        starts = np.concatenate([starts, np.clip(starts, 0.0, extent)])  # from outside it goes on at the edge
+        low = np.floor((starts.min(axis=0) - reach) / extent * size).astype(int) - AROUND
+        high = np.ceil((starts.max(axis=0) + reach) / extent * size).astype(int) + AROUND
+        low, high = np.clip(low, 0, size), np.clip(high, 0, size)
+        if 2 * np.prod(high - low, axis=1).sum() >= np.prod(size):
+            return None
+        return [
+            (x, y, right - x, bottom - y) for (x, y), (right, bottom) in zip(low.tolist(), high.tolist(), strict=True)
+        ]
 
 
 def _bounded(size: tuple[int, int]) -> tuple[int, int]:

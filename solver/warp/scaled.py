@@ -64,11 +64,13 @@ class ScaledMap:
         """As `WarpMap.size_for`."""
         return self.warp.size_for(picture, result)
 
-    def composed(self, size: tuple[int, int] | None = None, exact: bool = False) -> Field:
-        """As `WarpMap.composed`."""
+    def composed(
+        self, size: tuple[int, int] | None = None, exact: bool = False, regions: list[Region] | None = None
+    ) -> Field:
+        """As `WarpMap.composed`; at another amount than 1 everywhere."""
         size = self.size if size is None else size
         if self.amount == 1:
-            return self.warp.composed(size, exact)
+            return self.warp.composed(size, exact, regions)
         field = self._fields.get("composed", size, 2)
         if self._drawn != (made := (self.version, size, exact)):
             self._draw(field, (0.0, 0.0), field.texel, exact)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -12,6 +12,7 @@ from properties.fluid import TURNS, turned_map, turned_walls
 from solver.brush.masks import Masks
 from solver.fluid import Fluid
 from solver.gl.device import Device
+from solver.gl.field import Field
 from solver.gl.tiled import TILE, TiledField
 from solver.grid import Grid
 from solver.paper import PaperWarpMap
@@ -479,6 +480,39 @@ def test_forward_map_of_what_is_stirred_hard_is_as_exact(device: Device) -> None
     left = np.hypot(*(gone + warp.at(gone) - points).T) / grid.h  # by the map itself
     assert np.median(left) < 1e-4
     assert np.quantile(left, 0.99) < 0.01
+
+
+@pytest.mark.parametrize("folded", [False, True])
+def test_forward_map_of_a_few_points_needs_a_part_of_the_map_only(
+    device: Device, monkeypatch: pytest.MonkeyPatch, folded: bool
+) -> None:
+    """To the bit as where all of it is put together: at the edges, beyond them, and where it is wound up or folded."""
+    grid = Grid(64, 48)
+    rng = np.random.default_rng(4)
+    warp = WarpMap(device, grid, (2560, 1920))
+    if folded:
+        warp.set(smooth(rng, warp.size, 0.4))
+    for step in range(40):
+        warp.advance_prescribed(vortex, 1 / 60, step / 60)
+    points = np.vstack([rng.uniform((-0.1, -0.1), (1.1, 0.9), (24, 2)), [(0.0, 0.0), (1.0, 0.75), (0.5, 0.375)]])
+    forward = ForwardMap(warp)
+    drawn, few = list[float](), []
+    composed = WarpMap.composed
+
+    def note(warp: WarpMap, size: Any = None, exact: bool = False, regions: Any = None) -> Field:
+        if exact:
+            drawn.append(1.0 if regions is None else sum(x * y for *_, x, y in regions) / np.prod(warp.size))
+        return composed(warp, size, exact, regions)
+
+    monkeypatch.setattr(WarpMap, "composed", note)
+    for each in np.array_split(points, 9):
+        few.append(forward.at(each))
+    assert max(drawn) < 0.5
+    many = np.tile(points, (40, 1))
+    np.testing.assert_array_equal(np.concatenate(few), forward.at(many)[: len(points)])
+    assert drawn[-1] == 1
+    forward.release()
+    warp.release()
 
 
 def test_forward_map_of_a_folded_one_is_finite(device: Device) -> None:

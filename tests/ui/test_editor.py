@@ -604,6 +604,10 @@ def test_files_that_are_no_pictures_leave_the_work_alone(robot: Robot, tmp_path:
         assert name in robot.editor.messages.shown[-1].text, name
         assert robot.editor.session.recipe is recipe
     assert (tmp_path / "kept.fluidwarp").read_bytes() == whole
+    write_picture(tmp_path / "other.png", pattern())
+    robot.drop(tmp_path / "other.png")
+    robot.frame(count=2)
+    assert not robot.editor.messages.shown  # that something else could not be opened is of no interest any more
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="names are texts elsewhere")
@@ -856,6 +860,62 @@ def test_the_browser_chooses_where(robot: Robot, tmp_path: Path) -> None:
     robot.frame(count=2)
     assert chosen == [tmp_path / "saved.fluidwarp"]
     assert not robot.editor.dialogs.shown
+
+
+def test_the_browser_s_button_opens_what_is_typed_or_else_what_is_picked(robot: Robot, tmp_path: Path) -> None:
+    chosen: list[Path] = []
+    for name in ("a.pts", "deep/b.pts"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).touch()
+    robot.editor.chooser.ask_which("Open", tmp_path, (".pts",), chosen.append)
+    robot.frame(count=2)
+    browser = robot.editor.dialogs.shown[-1]
+    assert isinstance(browser, Browser)
+    right, bottom = browser.rect.x + browser.rect.width, browser.rect.y + browser.rect.height
+
+    def press() -> None:
+        robot.click(right - 24 - 44, bottom - 44)
+        robot.frame(count=2)
+
+    def pick(number: int) -> None:
+        robot.click(browser.rect.x + 200, browser.rect.y + 110 + 34 * number)
+        robot.frame(count=2)
+
+    def write(path: str) -> None:
+        robot.click(browser.rect.x + 200, browser.rect.y + 72)
+        robot.key("ctrl+a")
+        robot.type(path)
+        robot.frame(count=2)
+
+    press()
+    assert (chosen, browser.problem, browser.folder) == ([], "", tmp_path)  # there is nothing to open yet
+    pick(0)
+    press()
+    assert browser.folder == tmp_path / "deep"
+    write(str(tmp_path))
+    press()
+    assert (chosen, browser.folder) == ([], tmp_path)
+    pick(1)
+    write(str(tmp_path / "deep" / "b.pts"))
+    press()
+    assert chosen == [tmp_path / "deep" / "b.pts"]
+    assert not robot.editor.dialogs.shown
+
+
+def test_the_browser_asks_of_each_name_whether_it_may_be_replaced(robot: Robot, tmp_path: Path) -> None:
+    chosen: list[Path] = []
+    for name in ("a.fluidwarp", "b.fluidwarp"):
+        (tmp_path / name).touch()
+    robot.editor.chooser.ask_where("Save", tmp_path / "a.fluidwarp", (".fluidwarp",), chosen.append)
+    robot.frame(count=2)
+    browser = robot.editor.dialogs.shown[-1]
+    assert isinstance(browser, Browser)
+    for name in ("a.fluidwarp", "b.fluidwarp", "b.fluidwarp"):
+        assert not chosen
+        browser.name = name
+        robot.click(browser.rect.x + browser.rect.width - 24 - 44, browser.rect.y + browser.rect.height - 44)
+        robot.frame(count=2)
+    assert chosen == [tmp_path / "b.fluidwarp"]
 
 
 def test_a_folder_that_is_not_there_is_told_in_the_browser(robot: Robot) -> None:

@@ -134,6 +134,24 @@ def test_a_picture_that_is_opened_begins_with_the_fluid_as_it_is_now(
     assert robot.editor.session.recipe.fluid.viscosity == 1.25
 
 
+@pytest.mark.parametrize(("then", "wanted"), [(None, 0.02), (0.3, 0.3)])
+def test_a_picture_that_is_opened_does_not_begin_with_what_a_fit_has_found(
+    robot: Robot, widgets: Widgets, tmp_path: Path, then: float | None, wanted: float
+) -> None:
+    """That is for the handles of the work it was made of; what the person sets after it is not."""
+    session = robot.editor.session
+    session.change("Viscosity", viscosity=0.02)
+    for found in (0.007, 0.008):
+        session.edit("Fit", fluid=session.recipe.fluid.model_copy(update={"viscosity": found}))
+    if then is not None:
+        session.change("Viscosity", viscosity=then)
+    write_picture(tmp_path / "other.png", Picture(np.zeros((48, 64, 3), np.uint8)))
+    robot.drop(tmp_path / "other.png")
+    widgets.click("Don't save")
+    assert robot.editor.session.project.picture.width == 64
+    assert robot.editor.session.recipe.fluid.viscosity == wanted
+
+
 def test_edges_of_the_fluid_are_what_is_pressed(robot: Robot, widgets: Widgets) -> None:
     for words, walls in (("Edges hold", "no-slip"), ("Edges glide", "free-slip")):
         widgets.click(words)
@@ -460,6 +478,25 @@ def test_an_exported_animation_is_what_is_asked_for(robot: Robot, dialog: Export
     job = dialog.job()
     assert dialog.choices.kind == ANIMATION
     assert (job.recipe.output.fps, job.recipe.time.start, job.recipe.time.end) == pytest.approx((24, 0.1, 0.2))
+
+
+def test_what_plays_stands_still_behind_the_dialog_of_the_export(robot: Robot) -> None:
+    """A picture is of the moment at which the dialog was asked for, and not of a later one."""
+    session = robot.editor.session
+    robot.drag((0.3, 0.5), (0.6, 0.5), steps=8)
+    robot.rest()
+    robot.key("home")
+    robot.key("space")
+    robot.frame(count=6)
+    assert session.playing
+    robot.key("ctrl+e")
+    moment = session.tick
+    assert 0 < moment < session.end
+    robot.frame(count=6)
+    dialog = robot.editor.dialogs.shown[-1]
+    assert isinstance(dialog, ExportDialog)
+    assert session.tick == moment
+    assert not session.is_moving
 
 
 def test_an_animation_ends_where_the_recording_does_that_goes_on_behind_the_dialog(

@@ -58,6 +58,22 @@ def test_a_point_is_dragged_where_it_shall_go_and_stays_there(robot: Robot) -> N
     assert session.held[0].now == pytest.approx(handle.goal, abs=2 * ARRIVED)
 
 
+@pytest.mark.parametrize(("radius", "way"), [(0.06, 0.03), (0.1, 0.05)])
+def test_nobody_says_that_one_is_on_its_way_where_time_stands_still(
+    device: Device, tmp_path: Path, radius: float, way: float
+) -> None:
+    """The map can hardly bend further, and it creeps: more slowly than anything else that is let move on."""
+    with Robot(device, small_project(tmp_path)) as robot:
+        robot.key("g")
+        robot.editor.state.brush = replace(robot.editor.state.brush, radius=radius)
+        drag(robot, (0.5, 0.5), (0.5 + way, 0.5))
+        session = robot.editor.session
+        assert not session.is_moving
+        (unmet,) = session.unmet.values()
+        assert session.replay.handles.halts[0] in ("strain", "alone")
+        assert "on its way" not in unmet.said
+
+
 def test_it_is_driven_while_the_pointer_still_drags(robot: Robot) -> None:
     x, y = robot.at(0.4, 0.5)
     robot.move(x, y)

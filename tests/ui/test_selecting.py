@@ -445,3 +445,12 @@ def test_a_person_selects_freezes_and_renders_the_same(tmp_path: Path, fluidwarp
     rendered, before = read_picture(tmp_path / "one.png").pixels, pattern().pixels
     assert np.array_equal(rendered[kept][..., :3], before[kept])
     assert not np.array_equal(rendered[..., :3], before)
+
+
+def test_the_selection_stands_above_the_handles_while_its_tool_is_in_hand(robot: Robot, widgets: Widgets) -> None:
+    robot.key("g")
+    robot.drag((0.4, 0.5), (0.4, 0.5), steps=1)
+    robot.rest()
+    robot.key("m")
+    robot.frame(count=2)
+    assert widgets.at["Selection"].y < widgets.at["Handles and pins"].y < widgets.at["Fluid"].y

@@ -65,8 +65,8 @@ def draw(
     with ui.panel("inspector", rect, (16, 4), imgui.WindowFlags_.none):
         imgui.begin_child("sections")
         for name, label, section, opened in (
-            *_about_handles(ui, workspace, state, do),
             *_about_selection(ui, workspace, state, selecting, do),
+            *_about_handles(ui, workspace, state, do),
             *_about_bars(ui, session, state),
             ("fluid", "Fluid", lambda: _fluid(ui, session, state), True),
             ("symmetry", "Symmetry", lambda: _symmetry(ui, state), False),
