@@ -137,8 +137,12 @@ def beside_edges(places: np.ndarray, extent: tuple[float, float]) -> tuple[np.nd
 
 def short_of_edges(places: np.ndarray, goals: np.ndarray, extent: tuple[float, float]) -> float:
     """How far, at most, points of a line at `places` (n, 2) stay from their `goals` (n, 2) within `beside_edges`."""
-    lack = np.clip(goals, *beside_edges(places, extent)) - goals
-    return float(np.hypot(*lack.T).max(initial=0.0))
+    return beyond(goals, beside_edges(places, extent))
+
+
+def beyond(goals: np.ndarray, bounds: tuple[np.ndarray, np.ndarray]) -> float:
+    """How far, at most, `goals` (n, 2) lie outside of the bounds of each, the least and the greatest, (n, 2) each."""
+    return float(np.hypot(*(np.clip(goals, *bounds) - goals).T).max(initial=0.0))
 
 
 def check_step(dt: float) -> float:

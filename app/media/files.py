@@ -14,6 +14,7 @@ from itertools import pairwise, product
 from pathlib import Path
 
 from app.errors import UserError
+from app.media.inputs import cannot_read
 from app.media.leftovers import sweep, temporary_name
 from app.progress import if_abandoned
 
@@ -186,7 +187,7 @@ def numbered_files(pattern: str | os.PathLike[str]) -> dict[int, Path]:
     except FileNotFoundError:
         raise UserError(f"Cannot read {pattern}: there is no folder {folder}; check the name.") from None
     except OSError as error:
-        raise UserError(f"Cannot read {pattern}: {error.strerror or error}.") from None
+        raise cannot_read(pattern, error) from None
     found = sorted((number, name) for name in names if (number := number_in(pattern, name)) is not None)
     if not found:
         raise UserError(f"Cannot read {pattern}: there is no such file; check the name.")

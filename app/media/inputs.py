@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import os
+import re
 import stat
 import zipfile
 from pathlib import Path
@@ -11,6 +13,15 @@ from typing import BinaryIO
 
 from app.errors import UserError
 
+MENDS = {
+    errno.ENOENT: "there is no such file; check the name",
+    errno.EACCES: "no permission to read it; change its permissions",
+    errno.EPERM: "no permission to read it; change its permissions",
+    errno.ELOOP: "it is a link that leads back to itself; give the name of the file",
+    errno.ENAMETOOLONG: "the name is too long; check it",
+    errno.ENOTDIR: "a part of its path is a file; check the name",
+    errno.EIO: "the disk fails to read it; get it from another copy",
+}
 MAX_PIXELS = 400_000_000  # of a picture that is unpacked, if nothing else is said
 MOST_TEXT = 64 * 2**20  # bytes of a recipe: twice as much as its most numbers take when they are saved
 SMALL = 2 * 2**20  # bytes that anything may unpack to
@@ -33,14 +44,18 @@ def open_input(path: str | os.PathLike[str], kind: str = "file", most: int | Non
             stream.close()
             raise
         return stream
-    except FileNotFoundError:
-        raise UserError(f"Cannot read {path}: there is no such file; check the name.") from None
     except ValueError:
         raise UserError(f"Cannot read {path}: no file has a NUL in its name; check the name.") from None
-    except PermissionError:
-        raise UserError(f"Cannot read {path}: no permission to read it; change its permissions.") from None
     except OSError as error:
-        raise UserError(f"Cannot read {path}: {error.strerror or error}.") from None
+        raise cannot_read(path, error) from None
+
+
+def cannot_read(path: str | os.PathLike[str], error: OSError) -> UserError:
+    """What `error` means for the user who wanted `path` read."""
+    reason = MENDS.get(error.errno or 0, f"{error.strerror or error or 'the system gave no reason'}; try a copy of it")
+    if error.errno == errno.ENOENT and re.match("[a-zA-Z]{2,}:/", str(path)):  # of a path, only one slash is left
+        reason = "it is an address, and only files are read; download it first"
+    return UserError(f"Cannot read {path}: {reason}.")
 
 
 def state_of(path: str | os.PathLike[str] | int) -> tuple[int, ...] | None:
@@ -71,7 +86,7 @@ def read_start(path: str | os.PathLike[str], kind: str, count: int, most: int | 
         try:
             return stream.read(count)
         except OSError as error:  # of the disk or the network, or of a file of the system's that cannot be read
-            raise UserError(f"Cannot read {path}: {error.strerror or error}.") from None
+            raise cannot_read(path, error) from None
 
 
 def _check(path: str | os.PathLike[str], status: os.stat_result, kind: str, most: int | None) -> None:

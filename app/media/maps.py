@@ -28,7 +28,7 @@ from app.media.displacement import (
     to_st,
 )
 from app.media.files import replacing
-from app.media.inputs import MAX_PIXELS, check_size, open_input, read_start
+from app.media.inputs import MAX_PIXELS, cannot_read, check_size, open_input, read_start
 from app.media.pictures import read_picture
 from app.progress import never
 
@@ -279,8 +279,7 @@ def _read_npy(file: Path, max_pixels: int, check: Check) -> tuple[np.ndarray, di
             if any(isinstance(side, bool) for side in shape):  # Python's whole numbers, but not NumPy's
                 raise ValueError(f"its shape is {shape}")
         except Exception as error:  # its header is read by Python's own tokenizer, which raises anything
-            reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
-            raise UserError(f"Cannot read {file}: it is not a NumPy array, or truncated ({reason}).") from error
+            raise UserError(f"Cannot read {file}: it is not a NumPy array, or damaged; get it again.") from error
         if len(shape) != 3 or shape[2] != 2 or kind.kind != "f":
             raise UserError(
                 f"Cannot read {file}: a map is a float array (height, width, 2), this one is {kind} {shape}."
@@ -302,7 +301,7 @@ def _in_memory(file: Path, read: Callable[[], np.ndarray]) -> np.ndarray:
     except MemoryError:
         raise UserError(f"Cannot read {file}: it does not fit into the memory.") from None
     except OSError as error:
-        raise UserError(f"Cannot read {file}: {error.strerror or error}.") from None
+        raise cannot_read(file, error) from None
 
 
 def _read_exr(file: Path, max_pixels: int, check: Check) -> tuple[np.ndarray, dict[str, str], int]:

@@ -15,7 +15,7 @@ from typing import Any
 from app.errors import UserError, printable, shown
 from app.media.clip import WHOLE, Clip
 from app.media.files import is_sequence, name_from, numbered_files, replacing
-from app.media.inputs import MAX_PIXELS, MOST_TEXT, Archive, open_input, read_input, state_of
+from app.media.inputs import MAX_PIXELS, MOST_TEXT, Archive, cannot_read, open_input, read_input, state_of
 from app.media.leftovers import temporary_folder
 from app.media.recipes import read_recipe
 from app.media.source import Source, open_source
@@ -140,7 +140,7 @@ def load(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Project:
     except (UserError, MemoryError):
         raise
     except OSError as error:
-        raise UserError(f"Cannot read {path}: {error.strerror or error}.") from None
+        raise cannot_read(path, error) from None
     except Exception:  # of a damaged archive: BadZipFile, zlib.error, NotImplementedError, RuntimeError, IndexError ...
         raise UserError(f"{path} is not a fluidwarp project, or is cut short or damaged; get it again") from None
 

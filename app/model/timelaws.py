@@ -354,6 +354,8 @@ def _compiled(text: str) -> Callable[[float], Any]:
                 return lambda t: t
             case ast.Name(id=name) if name in _CONSTANTS:
                 return lambda t: _CONSTANTS[name]
+            case ast.Name(id=name) if name in FUNCTIONS:
+                raise refuse(f'names "{name}", which is a function; write {name}(...)')
             case ast.Name(id=name):
                 raise refuse(f'names "{name}", which is not known; known are t, {", ".join(_CONSTANTS)}')
             case ast.BinOp(op=op) if type(op) in _BINARY:

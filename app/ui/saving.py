@@ -55,7 +55,7 @@ class SaveDialog(Dialog):
         self._chooser = chooser
         self._write = write
         self._then = then
-        self._is_new = True
+        self._asks_name = True
 
     @property
     def path(self) -> Path:
@@ -77,9 +77,9 @@ class SaveDialog(Dialog):
     def _ask(self, ui: Ui) -> bool:
         """Where it goes, and what goes into it; True if Enter was pressed in the name."""
         imgui.set_next_item_width(imgui.get_content_region_avail().x - ui.px(104))
-        if self._is_new:
+        if self._asks_name:
             imgui.set_keyboard_focus_here()
-            self._is_new = False
+            self._asks_name = False
         flags = imgui.InputTextFlags_.enter_returns_true | imgui.InputTextFlags_.auto_select_all
         entered, self.name = imgui.input_text("##name", self.name, flags)
         imgui.same_line()
@@ -111,6 +111,7 @@ class SaveDialog(Dialog):
         saved = self.attempt(lambda: self._write(self.path, self.embed))
         if saved and self._then is not None:
             self._then()
+        self._asks_name = not saved  # Enter has taken the keys away from it
         return saved
 
     def _chosen(self, path: Path) -> None:

@@ -26,6 +26,7 @@ from solver.limits import (
     MOST_STRETCH,
     MOST_TURNED,
     beside_edges,
+    beyond,
     check_type,
     numbers,
     places,
@@ -320,7 +321,7 @@ class Shape:
         ends = self.due(starts, math.inf, 1.0)
         if not self.handle.points:
             starts, ends = starts[:1], ends[:1]
-        return float(np.hypot(*(np.clip(ends, *self.edges(starts)) - ends).T).max())
+        return beyond(ends, self.edges(starts))
 
     def away(self, places: np.ndarray, ends: np.ndarray) -> float:
         """How far what is farthest of it is from these places; of a ring, by how far it is turned and scaled."""

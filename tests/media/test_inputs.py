@@ -552,6 +552,22 @@ def test_a_file_that_cannot_be_read_to_its_end_is_told(tmp_path: Path, name: str
     assert is_project(path) == (path.suffix == ".fluidwarp")
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="links are made otherwise there")
+def test_what_cannot_be_opened_is_told_with_the_mend(tmp_path: Path):
+    (loop := tmp_path / "loop.png").symlink_to(loop)
+    (file := tmp_path / "file.png").touch()
+    for path, said in {
+        loop: "it is a link that leads back to itself; give the name of the file.",
+        tmp_path / ("x" * 300 + ".png"): "the name is too long; check it.",
+        file / "a.png": "a part of its path is a file; check the name.",
+        Path("http://example.org/a.png"): "it is an address, and only files are read; download it first.",
+        Path("C:/gone.png"): "there is no such file; check the name.",
+    }.items():
+        with pytest.raises(UserError) as error:
+            read_picture(path)
+        assert str(error.value) == f"Cannot read {path}: {said}"
+
+
 def test_files_are_of_a_bounded_size(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     path = tmp_path / "a.toml"
     with path.open("wb") as stream:

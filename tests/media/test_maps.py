@@ -393,7 +393,7 @@ def test_what_is_no_map(tmp_path: Path):
         read_map(tmp_path / "a.npy")
     header = b"{'descr': '<f4', 'fortran_order': False, 'shape': (True, 4, 2)}\n"
     (tmp_path / "a.npy").write_bytes(b"\x93NUMPY\1\0" + len(header).to_bytes(2, "little") + header + bytes(32))
-    with pytest.raises(UserError, match=r"it is not a NumPy array, or truncated \(its shape is \(True, 4, 2\)\)"):
+    with pytest.raises(UserError, match=r"it is not a NumPy array, or damaged; get it again\.$"):
         read_map(tmp_path / "a.npy")
     with pytest.raises(UserError, match=r"b\.npy: there is no such file; check the name\.$"):
         read_map(tmp_path / "b.npy")

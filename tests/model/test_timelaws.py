@@ -99,6 +99,7 @@ def test_a_smooth_formula_is_integrated_exactly() -> None:
         ("[1, 2]", "not allowed"),
         ("lambda: 1", "not allowed"),
         ("sin(t", "cannot be read"),
+        ("2*sin", "which is a function; write sin"),
         ("", "cannot be read"),
         ("'a' * 3", "not allowed"),
         ("True", "not allowed"),
