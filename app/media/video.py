@@ -162,9 +162,7 @@ def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Vid
     hidden = "Video: vp9" in video and "alpha_mode" in told  # a second stream, which only libvpx decodes
     alpha = hidden or bool(re.match(r"(yuva|gbrap|rgba|bgra|argb|abgr|ya\d|pal8)", pixel_format))
     matrix = "" if re.search(r"bt709|bt2020|smpte170m|bt470bg|gbr", video) else _untagged(video)
-    aspect = re.search(r"SAR (\d+):(\d+)", video)
-    square = aspect is None or aspect.group(1) == aspect.group(2)
-    filters = f"scale={'iw' if square else 'iw*sar'}:ih{matrix}:flags=accurate_rnd+full_chroma_int,setsar=1"
+    filters = f"scale={'iw*sar' if _wide(video) else 'iw'}:ih{matrix}:flags=accurate_rnd+full_chroma_int,setsar=1"
     late = _late(told, video)
     if late:  # or the first frame would be shown from the sound's start on
         filters = _delayed(late) + filters
@@ -198,6 +196,12 @@ def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Vid
     )
 
 
+def _wide(video: str) -> str:
+    """The width and height of a pixel, as 4:3, by ffmpeg's words about a stream; "" of square ones."""
+    aspect = re.search(r"SAR (\d+):(\d+)", video)
+    return "" if aspect is None or aspect[1] == aspect[2] else f"{aspect[1]}:{aspect[2]}"
+
+
 def _delayed(late: float) -> str:
     """The filter that lets frames begin `late` seconds earlier."""
     return f"setpts=PTS-{late}/TB,"
@@ -219,6 +223,8 @@ def _losses(told: str, video: str, fps: Fraction) -> list[str]:
         losses.append("it is interlaced, and its fields are treated as whole frames")
     if min(abs(_shortest(video) - 1), abs(_shortest(video) - 2)) > 0.02:  # 2: of fields
         losses.append(f"its frames come at a rate that varies, and become {float(fps):g} a second")
+    if ratio := _wide(video):
+        losses.append(f"its pixels of {ratio} become square")
     count = sum("attached pic" not in line for line in re.findall(r"Stream #0.*: Video: .*", told))
     if count > 1:
         losses.append(f"of its {count} video tracks only the first is used")

@@ -29,6 +29,7 @@ from app.media.depth import to_bits
 from app.media.encoders import check_animation, crf_of, is_animation, unheld_of_clip
 from app.media.pictures import read_picture
 from app.media.sequence import PictureSequence
+from app.media.source import open_source
 from app.media.video import read_clip, sound_tracks
 from app.model.picture import Picture
 
@@ -628,6 +629,14 @@ def test_wide_pixels_become_square(tmp_path: Path):
     clip = read_clip(generate(tmp_path / "a.mkv", "testsrc=s=64x48:r=10:d=0.5,setsar=3/2", "-c:v", "ffv1"))
     assert (clip.width, clip.height) == (96, 48)
     assert next(clip.read_frames()).shape == (48, 96, 3)
+    assert clip.note == "a.mkv: its pixels of 3:2 become square"
+
+
+def test_a_still_of_a_clip_tells_of_the_frames_it_leaves_out(tmp_path: Path):
+    for seconds, said in ((0.5, "a.mkv: of its frames only the first is used"), (0.1, "")):
+        clip = generate(tmp_path / "a.mkv", f"testsrc=s=64x48:r=10:d={seconds}", "-c:v", "ffv1")
+        assert open_source(clip, animated=False).picture.note == said
+        assert open_source(clip).picture.note == ""
 
 
 def test_ten_bits_are_read_as_sixteen(tmp_path: Path):

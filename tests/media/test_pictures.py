@@ -678,7 +678,8 @@ def test_what_of_a_tiff_is_lost_is_told(tmp_path: Path):
     tifffile.imwrite(
         path, np.dstack([noise(4, np.uint8), noise(2, np.uint8)]), photometric="rgb", planarconfig="contig"
     )
-    assert read_picture(path).note == "a.tif: of its 6 samples a pixel only the first 4 are used"
+    said = "a.tif: of its 6 samples a pixel only the first 4 are used; its sample 4 is of no kind that it names"
+    assert read_picture(path).note == f"{said}, and is taken for alpha"
     Image.frombytes("CMYK", (32, 32), bytes(32 * 32 * 4)).save(path)
     assert read_picture(path).note == "a.tif: its inks (CMYK) become RGB"
     with tifffile.TiffWriter(path) as writer:  # a smaller version of the same picture is no page of its own
@@ -713,6 +714,26 @@ def test_further_samples_of_a_tiff_are_no_colours(tmp_path: Path):
     tifffile.imwrite(path, pixels, photometric="separated", planarconfig="contig", extrasamples=["unassalpha"])
     said = "a.tif: of its 5 samples a pixel only the first 4 are used; its inks (CMYK) become RGB"
     assert read_picture(path).note == said
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+def test_alpha_is_no_ink(tmp_path: Path, dtype: type):
+    path, most = tmp_path / "a.tif", np.iinfo(dtype).max
+    ink = np.array([[[0, 0], [0, most], [most // 4, most // 2], [most, most]]], dtype)  # from white to black
+    options: dict[str, Any] = {"photometric": "miniswhite", "planarconfig": "contig"}
+    tifffile.imwrite(path, ink, extrasamples=["unassalpha"], **options)
+    light = [[most, 0], [most, most], [most - most // 4, most // 2], [0, most]]
+    assert read_picture(path).pixels[0].tolist() == light
+    tifffile.imwrite(path, ink, extrasamples=["assocalpha"], **options)
+    light = [[0, 0], [most, most], [most // 2 - most // 4, most // 2], [0, most]]
+    assert read_picture(path).pixels[0].tolist() == light
+    assert read_picture(path).premultiplied
+
+
+def test_a_sample_of_a_tiff_that_may_be_alpha_is_told(tmp_path: Path):
+    path = tmp_path / "a.tif"
+    tifffile.imwrite(path, noise(4, np.uint8), photometric="rgb", extrasamples=["unspecified"])
+    assert read_picture(path).note == "a.tif: its sample 4 is of no kind that it names, and is taken for alpha"
 
 
 @pytest.mark.parametrize("spread", [256, 257])

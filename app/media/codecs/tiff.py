@@ -117,17 +117,20 @@ def read(file: Path, max_pixels: int, place: int | None = None) -> Picture:
     if pixels.shape[2] > used:  # further samples are masks and spot colours
         losses.append(f"of its {pixels.shape[2]} samples a pixel only the first {used} are used")
         pixels = pixels[..., :used]
+    kinds = page.extrasamples[: pixels.shape[2] - colours]
+    premultiplied = tuple(kinds) == (tifffile.EXTRASAMPLE.ASSOCALPHA,)
+    if tuple(kinds) == (tifffile.EXTRASAMPLE.UNSPECIFIED,):
+        losses.append(f"its sample {used} is of no kind that it names, and is taken for alpha")
     if photometric == "PALETTE":
         pixels = _palette(tags[320])[pixels[..., 0]]
     elif photometric == "SEPARATED":
         pixels, icc, told = cmyk_to_rgb(pixels, icc)
         losses.append(told)
     elif photometric == "MINISWHITE" and pixels.dtype != np.float32:
-        pixels = np.iinfo(pixels.dtype).max - pixels
+        pixels = _ink_to_light(pixels, premultiplied)
     elif photometric not in ("MINISBLACK", "RGB", "YCBCR"):
         raise UserError(f"Cannot read {file}: a TIFF in {photometric} is not supported; convert it to RGB.")
 
-    premultiplied = tuple(page.extrasamples[:1]) == (tifffile.EXTRASAMPLE.ASSOCALPHA,)
     try:
         encoded = upright_exif(_exif(file, place_of_tags, layout))
     except Exception:  # damaged metadata must not cost the picture
@@ -166,6 +169,13 @@ def _exif(file: Path, place: int, layout: tuple[str, bool]) -> Any:
     if LAYOUT.match(str(exif.get(DESCRIPTION, ""))):
         del exif[DESCRIPTION]
     return exif
+
+
+def _ink_to_light(pixels: np.ndarray, premultiplied: bool) -> np.ndarray:
+    """Grey (h, w, 1 or 2) of which 0 is white, as light; alpha, by which ink is multiplied too, stays as it is."""
+    ink, alpha = pixels[..., :1], pixels[..., 1:]
+    white = alpha if premultiplied else pixels.dtype.type(np.iinfo(pixels.dtype).max)
+    return np.concatenate([white - np.minimum(ink, white), alpha], axis=2)
 
 
 def _palette(table: Any) -> np.ndarray:
