@@ -6,7 +6,7 @@ One long class: all handles are solved for together. What one leads is in `handl
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from itertools import pairwise
 from typing import Any, NamedTuple
 
