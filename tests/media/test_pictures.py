@@ -25,6 +25,7 @@ from app.errors import UserError
 from app.media import files
 from app.media.codecs.cmyk import cmyk_to_rgb
 from app.media.codecs.exr import read_channels
+from app.media.codecs.metadata import upright_dpi
 from app.media.depth import to_bits
 from app.media.encoders import check_output
 from app.media.ffmpeg import executable
@@ -1277,3 +1278,28 @@ def test_dots_per_inch_that_are_no_number_are_none(tmp_path: Path) -> None:
         data = whole.replace(struct.pack("<II", 72, 1), struct.pack("<II", 72, below))
         (tmp_path / "b.tif").write_bytes(data)
         assert (read_picture(tmp_path / "b.tif").dpi is None) == (below == 0)
+
+
+@pytest.mark.parametrize(
+    ("dpi", "kept"),
+    [
+        ((300, 200), True),
+        ((2**31 - 1, 2**31 - 1), True),
+        ((2**31, 2**31), False),
+        ((2**-31, 2**-31), False),
+        ((1, 999_999), True),
+        ((1, 1_000_000), False),
+        ((1_000_000, 1), False),
+        ((0, 72), False),
+        ((72, -72), False),
+        ((float("nan"), 72), False),
+        ((72,), False),
+        ((), False),
+        (None, False),
+    ],
+)
+def test_dots_an_inch_are_kept_upright_if_every_file_can_hold_them(dpi: Any, kept: bool):
+    """Turned by a quarter (EXIF's orientations 5 to 8), those along x are those along y."""
+    for orientation in range(1, 9):
+        turned = tuple(reversed(dpi)) if dpi and orientation >= 5 else dpi
+        assert upright_dpi(dpi, orientation) == (turned if kept else None)
