@@ -299,7 +299,9 @@ def _in_memory(file: Path, read: Callable[[], np.ndarray]) -> np.ndarray:
     try:
         return read()
     except MemoryError:
-        raise UserError(f"Cannot read {file}: it does not fit into the memory.") from None
+        raise UserError(
+            f"Cannot read {file}: it does not fit into the memory; close other programs, or make it smaller first."
+        ) from None
     except OSError as error:
         raise cannot_read(file, error) from None
 

@@ -23,6 +23,7 @@ import tifffile
 from PIL import Image
 
 from app.errors import MOST_SHOWN, UserError, printable, shown
+from app.media.codecs.decoding import decoding
 from app.media.inputs import open_input, read_input
 from app.media.maps import holds, read_map
 from app.media.pictures import read_picture, write_picture
@@ -775,3 +776,9 @@ def test_a_later_frame_of_a_gif_has_the_limit_of_pixels_too(tmp_path: Path) -> N
     (tmp_path / "a.gif").write_bytes(data)
     with pytest.raises(UserError, match="a frame of it has more than the limit of"):
         open_source(tmp_path / "a.gif")
+
+
+def test_what_does_not_fit_into_the_memory_has_a_mend(tmp_path: Path):
+    mend = "it does not fit into the memory; close other programs, or make it smaller first"
+    with pytest.raises(UserError, match=mend), decoding(tmp_path / "a.png", "PNG"):
+        raise MemoryError

@@ -24,7 +24,9 @@ def decoding(file: Path, name: str) -> Iterator[None]:
     except UserError:
         raise
     except MemoryError:
-        raise UserError(f"Cannot read {file}: it does not fit into the memory.") from None
+        raise UserError(
+            f"Cannot read {file}: it does not fit into the memory; close other programs, or make it smaller first."
+        ) from None
     except Exception as error:  # decoders of damaged files raise anything: IndexError, struct.error, zlib.error ...
         lines = [line.strip() for line in str(error).splitlines()]
         reason = next((line for line in lines if line.strip("0123456789")), type(error).__name__)
