@@ -164,7 +164,7 @@ def _known_keys(model: type[BaseModel], loc: tuple[int | str, ...]) -> set[str]:
         if isinstance(item, int):
             continue
         inner = [part for model in models if item in model.model_fields for part in _models_in(_field(model, item))]
-        tagged = [model for model in models if item in _literals(model) or item == model.__name__]
+        tagged = [model for model in models if item in _kinds(model) or item == model.__name__]
         models = inner or tagged or models
     return {key for model in models for key in model.model_fields}
 
@@ -177,17 +177,16 @@ def _tags(model: type[BaseModel], loc: tuple[int | str, ...]) -> list[str]:
             models = [
                 part for model in models if item in model.model_fields for part in _models_in(_field(model, item))
             ]
-    return [tag for model in models for tag in _literals(model)[:1]]
+    return [tag for model in models for tag in _kinds(model)]
 
 
 def _field(model: type[BaseModel], name: str) -> Any:
     return model.model_fields[name].annotation
 
 
-def _literals(model: type[BaseModel]) -> list[str]:
-    """The values of the fields that can only have one, which is how the members of a union are told apart."""
-    choices = (only_values(field) for field in model.model_fields.values())
-    return [values[0] for values in choices if len(values) == 1]
+def _kinds(model: type[BaseModel]) -> tuple[str, ...]:
+    """By which the members of a union are told apart."""
+    return only_values(model.model_fields["kind"]) if "kind" in model.model_fields else ()
 
 
 # -- where it stands in the file --------------------------------------------------------------------------------------

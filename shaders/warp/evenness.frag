@@ -1,7 +1,7 @@
 // Evenness: how far the four cells around a texel of a map agree on det J there, each by its own cubic (lib/displacement.glsl):
 // of a block, the largest of -least / greatest, -1 where all agree and 1 where all are folded. A smooth map has one det J.
 // u_displacement (D): longer sides, and u_images of it; u_spacing: distances of the texels, longer sides; u_side: texels along
-// a block. u_steepness: the largest |grad D|^2 of each block; where that is FLAT^2 at most it counts as even.
+// a block. u_steepness: the largest |grad D|^2 of each block; where that is u_flat^2 at most it counts as even.
 // Texels whose cubic would go on beyond the edge, as it has no images there, are left out, and with HELD those next to what
 // is held and in it (u_held, see lib/warp.glsl): on that border the map has a bend.
 // reads: 576
@@ -10,6 +10,7 @@ uniform sampler2D u_steepness;
 uniform vec2 u_spacing;
 uniform vec4 u_images;
 uniform float u_side;
+uniform float u_flat;
 #ifdef HELD
 uniform sampler2D u_held;
 #endif
@@ -48,7 +49,7 @@ void main() {
     vec2 size = vec2(textureSize(u_displacement, 0)), block = floor(gl_FragCoord.xy);
     out_uneven = -1.0;
     // The last block may have no corner of its own.
-    if (texelFetch(u_steepness, min(ivec2(block), textureSize(u_steepness, 0) - 1), 0).r <= FLAT * FLAT) return;
+    if (texelFetch(u_steepness, min(ivec2(block), textureSize(u_steepness, 0) - 1), 0).r <= u_flat * u_flat) return;
     vec4 inner = 2.0 * (1.0 - abs(u_images));
     vec2 first = max(u_side * block, inner.xz), end = min(u_side * (block + 1.0), size - inner.yw);
     for (float y = first.y + 0.5; y < end.y; ++y)

@@ -45,7 +45,7 @@ class Evenness:
             held: where it is held, see `Frozen`; next to that, and there, nothing is looked at.
         """
         self._largest.clear(-1.0)
-        defines: dict[str, object] = {"FLAT": FLAT} if held is None else {"FLAT": FLAT, "HELD": 1}
+        defines: dict[str, object] = {} if held is None else {"HELD": 1}
         given: dict[str, Any] = {} if held is None else {"held": held}
         blocks = [(x // SIDE, y // SIDE, *blocks_of((width, height))) for x, y, width, height in regions]
         look = self.device.pass_("warp/evenness.frag", **defines)
@@ -57,6 +57,7 @@ class Evenness:
             spacing=spacing,
             images=images,
             side=SIDE,
+            flat=FLAT,
             **given,
         )
         return -float(self._find_largest(self._largest)[0])

@@ -264,6 +264,7 @@ def test_what_must_not_go_beyond_another_may_be_the_same(text: str):
         ("force", ("point", "curve", "field", "gradient", "vortex", "source", "sink")),
         ("viscosity", ("constant", "picture", "path")),
         ("freeze", ("constant", "picture", "path")),
+        ("mask", ("stroke", "clear", "fill", "invert", "feather", "grow", "shrink", "picture")),
     ],
 )
 def test_of_a_kind_that_there_is_not_all_are_told_that_there_are(table: str, kinds: tuple[str, ...]):

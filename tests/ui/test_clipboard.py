@@ -103,7 +103,6 @@ def robot(device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> It
         yield robot
 
 
-@pytest.mark.parametrize("chord", ["ctrl+c", "ctrl+v"])
 class Board:
     """The system's clipboard, as copykitten has it: 8 bits of red, green, blue and alpha."""
 
@@ -143,6 +142,7 @@ def test_any_picture_is_copied_with_alpha_and_pasted_without_where_it_is_opaque(
     np.testing.assert_array_equal(found, wanted if channels in (2, 4) else colours)
 
 
+@pytest.mark.parametrize("chord", ["ctrl+c", "ctrl+v"])
 def test_without_copykitten_a_sentence_says_how_to_get_it(robot: Robot, chord: str) -> None:
     robot.key(chord)
     robot.frame()
