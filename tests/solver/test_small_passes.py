@@ -275,7 +275,15 @@ def test_where_the_cells_around_a_texel_disagree_on_its_area_is_found(
         more = {"HELD": 1, "held": np.where(far == 0, 1, (127 - far) / 255).astype(np.float32)}
         uneven[far <= 1] = -1
     steepness = np.array([[2.0, 2.0, 2.0], [2.0, 0.9, 2.0]], np.float32)
-    given = {"displacement": moved, "steepness": steepness, "spacing": spacing, "images": images, "side": 8.0, "flat": 1.0, **more}
+    given = {
+        "displacement": moved,
+        "steepness": steepness,
+        "spacing": spacing,
+        "images": images,
+        "side": 8.0,
+        "flat": 1.0,
+        **more,
+    }
     found = drawn(device, "warp/evenness.frag", 1, (3, 2), **given)
     for row, column in np.ndindex(2, 3):
         block = uneven[8 * row : 8 * row + 8, 8 * column : 8 * column + 8]
