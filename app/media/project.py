@@ -204,6 +204,8 @@ def _read(path: Path, archive: Archive, max_pixels: int) -> Project:
     if recipe.picture is None:
         raise ValueError
     held = [name for name in picture_names(recipe) if name in names]
+    if any(Path(name).name in ("", "..") for name in held):  # no file can be called that
+        raise ValueError
     embedded = recipe.picture in names
     if not embedded:
         with named_in(path, path.parent / recipe.picture):

@@ -336,11 +336,13 @@ def test_data_beside_the_display_window_are_told(tmp_path: Path):
 
 def test_what_is_made_of_a_picture_as_it_was_is_told(tmp_path: Path):
     path = tmp_path / "a.exr"
-    colours = {name: noise(number, np.uint32) for number, name in enumerate("RGB")}
+    colours = {name: noise(number, np.uint32) >> 8 for number, name in enumerate("RGB")}
     OpenEXR.File({"preview": OpenEXR.PreviewImage(np.zeros((4, 5, 4), np.uint8))}, colours).write(str(path))
     assert read_picture(path).note == (
         "a.exr: its preview is not kept; its colours are whole numbers (uint), and are taken for light with white at 1"
     )
+    OpenEXR.File({}, {name: np.full((2, 3), 2**24 + (name == "G"), np.uint32) for name in "RGB"}).write(str(path))
+    assert read_picture(path).note.endswith("taken for light with white at 1, rounded beyond 16777216")
     path.write_bytes(mipmapped(np.array([[1, 2], [3, 4]], np.float32), np.array([[2.5]], np.float32)))
     picture = read_picture(path)
     assert picture.note == "a.exr: its smaller versions (mipmaps) are not kept"

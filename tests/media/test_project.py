@@ -87,6 +87,16 @@ def test_another_picture_gets_the_same_recipe(made: Project, tmp_path: Path) -> 
     assert other.recipe.picture == "other.png"
 
 
+@pytest.mark.parametrize("name", [".", ".."])
+def test_a_project_whose_picture_can_be_no_file_is_damaged(tmp_path: Path, name: str) -> None:
+    with zipfile.ZipFile(tmp_path / "work.fluidwarp", "w") as archive:
+        archive.writestr("format.txt", f"fluidwarp project {projects.VERSION}\n")
+        archive.writestr("recipe.toml", f'picture = "{name}"')
+        archive.writestr(name, b"of somebody")
+    with pytest.raises(UserError, match=r"work\.fluidwarp is not a fluidwarp project, or is cut short or damaged"):
+        projects.load(tmp_path / "work.fluidwarp")
+
+
 def test_a_newer_project_says_so(made: Project, tmp_path: Path) -> None:
     path = tmp_path / "work.fluidwarp"
     with zipfile.ZipFile(path, "w") as archive:

@@ -111,8 +111,9 @@ def read(file: Path, max_pixels: int) -> Picture:
             losses.append(not_kept("channel", part.subsampled))
     if turned := [layer.name for layer in layers if any(MOTION.fullmatch(word) for word in layer.name.split("."))]:
         losses.append(f"the arrows of its {counted('channel', turned)} are moved and not turned")
-    if any(own.channels[name].dtype == np.uint32 for name in colours):
-        losses.append("its colours are whole numbers (uint), and are taken for light with white at 1")
+    if whole := [own.channels[name] for name in colours if own.channels[name].dtype == np.uint32]:
+        rounded = ", rounded beyond 16777216" if any((channel > 2**24).any() for channel in whole) else ""
+        losses.append(f"its colours are whole numbers (uint), and are taken for light with white at 1{rounded}")
     wide = np.stack([own.shown(name, margins) for name in colours], axis=-1, dtype=np.float32)
     left, top, right, bottom = margins
     inside = wide[top : len(wide) - bottom, left : wide.shape[1] - right]
