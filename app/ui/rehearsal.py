@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from math import ceil
 from typing import Any
 
 import numpy as np
@@ -23,11 +24,14 @@ from app.work.handle_status import held_in
 from app.work.replay import Replay
 from solver.gl.device import Device
 from solver.gl.field import GraphicsMemoryError
+from solver.gl.tiled import TILE
 
-FINER = 2  # times the grid's cells are the pixels of the picture that is moved
-TICKS = 5  # of each part; by then its picture is moved so far that the map has three levels
+# Pixels along the longer side of the picture that is moved, at least: a map of fewer tiles is remapped at once.
+PIXELS = 4 * TILE
+TICKS = 10  # of each part; by then its picture is moved so far that the map has three levels
+CLOSED = 3  # maps, as many as half a minute of stirring closes
 
-PUSH = Stroke(tool="push", radius=0.15, samples=((0, 0.3, 0.5, 1.0), (TICKS, 0.6, 0.5, 1.0)))
+PUSH = Stroke(tool="push", radius=0.1, samples=((0, 0.2, 0.5, 1.0), (TICKS, 0.9, 0.5, 1.0)))
 AROUND = ((0, 0.5, 0.4, 1.0), (1, 0.5, 0.5, 1.0))
 
 
@@ -38,10 +42,12 @@ class Part:
     Attributes:
         parts: of a recipe.
         is_for: whether a recipe needs it.
+        closed: how many maps are closed before.
     """
 
     parts: dict[str, Any]
     is_for: Callable[[Recipe], bool]
+    closed: int = 0
 
 
 PARTS = (
@@ -59,6 +65,7 @@ PARTS = (
         },
         lambda recipe: bool(recipe.mask or recipe.viscosity or recipe.freeze),
     ),
+    *(Part({"stroke": (PUSH,)}, lambda recipe: False, closed) for closed in range(1, CLOSED + 1)),
 )
 
 
@@ -122,11 +129,16 @@ class Rehearsal:
             with self.interruptible(session.device):
                 if self.trial is None:
                     self._of, recipe = part, Recipe(fluid=session.recipe.fluid, **part.parts)
-                    plain = Picture(np.zeros((FINER * down, FINER * across, 3), np.uint8))
+                    finer = ceil(PIXELS / max(grid))
+                    plain = Picture(np.zeros((finer * down, finer * across, 3), np.uint8))
                     self.trial = Replay(session.device, recipe, Pictures(plain), budget=0)
+                    for _ in range(part.closed):
+                        self.trial.warp.close()
                 self.trial.advance()
                 held_in(self.trial)
                 look_at(self.trial, self._workspace.view)
+                if self.trial.tick == TICKS:
+                    self.trial.warp.close()  # what is left of a remap is done at once
         except Interrupted:
             self.release()
             return
@@ -160,6 +172,8 @@ class Rehearsal:
 
 
 def look_at(replay: Replay, view: Viewport) -> None:
-    """Make the map as the canvas has it drawn while things move."""
-    shown = view.canvas.width, view.canvas.height
-    replay.warp.composed(tuple(max(1, round(side * view.density / MOVING)) for side in shown))
+    """Draw the map as the canvas has it drawn while things move."""
+    width, height = (max(1, round(side * view.density / MOVING)) for side in (view.canvas.width, view.canvas.height))
+    field = replay.device.field((width, height), 2, "displacement, tried")
+    replay.warp.draw(field, (0.0, 0.0), (1 / width, 1 / height), coarsely=True)
+    field.release()

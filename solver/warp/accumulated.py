@@ -211,9 +211,8 @@ class AccumulatedMap:
         if part < 1:
             return True
         # A submap by itself is as steep as it is: closing a map of nothing would not mend that.
-        if self._may_close and self.now.tiles and self._is_too_steep(held):
-            self.forget()
-            self._close()
+        if self.may_close and self.now.tiles and self._is_too_steep(held):
+            self.close()
             return False
         self.now, self._next = self._next, self.now
         self.undone, self._next_undone = self._next_undone, self.undone
@@ -230,14 +229,15 @@ class AccumulatedMap:
         return -(-self.size[0] // times), -(-self.size[1] // times)
 
     @property
-    def _may_close(self) -> bool:
+    def may_close(self) -> bool:
+        """True if there is room for another closed map."""
         width, height = self._closed_size
         own = sum(field.components for field, _, _ in self._pairs) * 4 * width * height
         return len(self._chain) < MOST_CLOSED and own + sum(field.nbytes for field in self.closed) <= MOST_CLOSED_BYTES
 
     def _look(self, tiles: list[Region]) -> None:
         """Look at how steep tiles of `_next` are, if another map may be closed."""
-        if self._may_close:
+        if self.may_close:
             self._steepness.look(self._next, self._spacing, tiles)
 
     def _is_too_steep(self, held: Field | None) -> bool:
@@ -252,8 +252,9 @@ class AccumulatedMap:
     def _spacing(self) -> tuple[float, float]:
         return self.extent[0] / self.size[0], self.extent[1] / self.size[1]
 
-    def _close(self) -> None:
-        """Keep it as it is, and go on with a map of nothing."""
+    def close(self) -> None:
+        """Keep it as it is, and go on with a map of nothing; what was planned is forgotten."""
+        self.forget()
         size, steep = self._closed_size, [self.now] if self.undone is None else [self.undone, self.now]
         if size == self.size:
             self.closed += steep

@@ -294,6 +294,16 @@ class WarpMap:
         self._frozen.draw_anew(self.draw_held)
         self._changed()
 
+    def close(self) -> None:
+        """Go on with an accumulated map of nothing above the one so far, as a remap does when that becomes too steep.
+
+        Every place leads where it has led. Nothing happens if as many maps are closed as may be.
+        """
+        self._remapping.finish()
+        if self._accumulated.may_close:
+            self._accumulated.close()
+            self._changed()
+
     def set(self, displacement: np.ndarray) -> None:
         """Take over a displacement (h, w, 2) in longer sides, of any size from 6 x 6, laid over the whole domain.
 

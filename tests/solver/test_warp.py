@@ -24,6 +24,7 @@ from solver.warp.frozen import FADED, Frozen
 from solver.warp.inverse import ForwardMap
 from solver.warp.map import WarpMap
 from solver.warp.remapping import MOST_TILES, REMAP_STEPS
+from solver.warp.state import MOST_CLOSED
 from solver.warp.submap import Level
 from support import reference
 from support.flows import VORTEX_TIME, saved, vortex, vortex_faces
@@ -858,6 +859,20 @@ def test_a_bend_at_the_border_of_what_is_held_closes_no_map(device: Device) -> N
         warp.advance_prescribed(flow, part)
         warp.remap()
     assert closed(warp) == 0
+    warp.release()
+
+
+def test_a_map_that_is_closed_leads_where_it_has_led(device: Device) -> None:
+    """Also what a remap has begun to take in; and of more than there may be none is closed."""
+    warp = wound_up(device, 1.0)
+    before = warp.read(warp.size)
+    for number in range(MOST_CLOSED):
+        assert closed(warp) == number
+        warp.close()
+        assert difference(warp.read(warp.size), before) < 1e-5
+    warp.close()
+    assert closed(warp) == MOST_CLOSED
+    assert difference(warp.read(warp.size), before) < 1e-5
     warp.release()
 
 

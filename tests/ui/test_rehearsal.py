@@ -2,8 +2,18 @@
 
 from __future__ import annotations
 
-from app.ui.rehearsal import PARTS
-from support.editing import Robot
+from math import cos, sin
+from pathlib import Path
+
+import moderngl
+import pytest
+
+from app.ui.rehearsal import PARTS, TICKS
+from solver.gl import passes
+from solver.gl.device import Device
+from solver.gl.program import compile_program
+from solver.warp.state import closed_in
+from support.editing import Robot, small_project
 
 
 def nothing() -> bool:
@@ -61,5 +71,28 @@ def test_the_parts_do_what_they_are_for(robot: Robot) -> None:
         robot.frame()
         if rehearsal.trial is not None:
             moved.append(float(abs(rehearsal.trial.warp.read()).max()))
-    assert len(moved) == 4 * len(PARTS)
-    assert min(moved[3::4]) > 0.01
+    seen = TICKS - 1  # of the last tick nothing is left to see
+    assert len(moved) == seen * len(PARTS)
+    assert min(moved[seen - 1 :: seen]) > 0.01
+
+
+def test_a_long_stir_compiles_nothing_that_is_felt(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each program is a frame of a tenth of a second on a machine that has none yet: also those of closed maps."""
+    compiled = list[str]()
+
+    def compiling(ctx: moderngl.Context, shader: str, defines: dict[str, object]) -> moderngl.Program:
+        compiled.append(f"{shader} {defines}")
+        return compile_program(ctx, shader, defines)
+
+    with Device.headless() as device, Robot(device, small_project(tmp_path)) as robot:
+        rehearsal, session = robot.editor.rehearsal, robot.editor.session
+        rehearsal.has_news = nothing
+        session.change("Water", viscosity=0.0065, drag=0.0)
+        robot.until(lambda: not rehearsal.is_wanted)
+        monkeypatch.setattr(passes, "compile_program", compiling)
+        robot.move(*robot.at(0.7, 0.5))
+        robot.press()
+        for frame in range(60):
+            robot.move(*robot.at(0.5 + 0.2 * cos(0.4 * frame), 0.5 + 0.2 * sin(0.4 * frame)))
+        assert closed_in(session.replay.warp.save().tiles)
+        assert set(compiled) <= {"gl/copy.frag {}"}  # which takes no time worth it
