@@ -83,7 +83,7 @@ class Multigrid:
         self.set_spacing(spacing)
         unknowns = 8 * math.prod(self.levels[-1].texels)
         self._inverse = device.field((unknowns // 4, unknowns), 4, "viscous inverse")
-        self._sweeps, self._is_full = 1, False  # of a cycle, see `Plan`
+        self._sweeps = 1  # of a cycle, see `Plan`
         self._largest = 0.0  # kappa
         self._alone: Level | None = None  # of one viscosity: the first that needs no coarser one
 
@@ -128,7 +128,7 @@ class Multigrid:
         changes few cells. Where the field holds more than the largest `amount`, it counts as that.
         """
         self.has_transform, self._alone = False, None
-        self._sweeps, self._is_full = plan.sweeps, plan.full
+        self._sweeps = plan.sweeps
         self._largest = float(amount[~is_solid].max(initial=0.0)) * self._scale(dt)
         most = plan.stiff if plan.rigid else UNBOUNDED
         levels = self.levels if plan.method == "cg" else self.levels[:1]
@@ -178,22 +178,17 @@ class Multigrid:
         if "UNIFORM" in self.finest.defines:
             self.sawtooth(self.finest, rhs)
         else:
-            self.cycle(self.finest, rhs, 0 if start else self._begin(self.finest, rhs), rigid, self._is_full)
+            self.cycle(self.finest, rhs, 0 if start else self._begin(self.finest, rhs), rigid)
         return self.finest.faces.read
 
-    def cycle(
-        self, level: Level, rhs: PackedFaces, begun: int, rigid: Deflation | None = None, is_full: bool = False
-    ) -> None:
-        """One V-cycle for A faces = rhs, from the level's iterate, of which `begun` sweeps are made; or an F-cycle.
-
-        An F-cycle solves for the coarse correction by an F-cycle and then a V-cycle.
-        """
+    def cycle(self, level: Level, rhs: PackedFaces, begun: int, rigid: Deflation | None = None) -> None:
+        """One V-cycle for A faces = rhs, from the level's iterate, of which `begun` sweeps are made."""
         if level is self.direct_level:
             self.direct_solve(rhs)
             return
         weights = self._weights(level)
         self.smooth(level, rhs, weights[begun:])
-        self._coarse_correction(level, rhs, rigid, is_full)
+        self._coarse_correction(level, rhs, rigid)
         self.smooth(level, rhs, weights[::-1])
 
     def sawtooth(self, level: Level, rhs: PackedFaces) -> None:
@@ -217,7 +212,7 @@ class Multigrid:
         level.faces.swap()
         self.smooth(level, rhs, self._weights(level))
 
-    def _coarse_correction(self, level: Level, rhs: PackedFaces, rigid: Deflation | None, is_full: bool) -> None:
+    def _coarse_correction(self, level: Level, rhs: PackedFaces, rigid: Deflation | None) -> None:
         """f += P A_coarse^-1 P' (rhs - A f); with `rigid` parts M P in place of P, between two corrections of these."""
         # The write side is free until the correction is added.
         faces, free = level.faces.read, level.faces.write
@@ -228,9 +223,7 @@ class Multigrid:
             moved = rigid.correct(free, faces, add=True)
             self.residual(level, faces, rhs, free)
             averaged = rigid.average(free, moved)
-        self.cycle(coarser, coarser.rhs, self._restrict(averaged, coarser, start=True), is_full=is_full)
-        if is_full and coarser is not self.direct_level:
-            self.cycle(coarser, coarser.rhs, 0)
+        self.cycle(coarser, coarser.rhs, self._restrict(averaged, coarser, start=True))
         prolong = self.device.pass_("viscosity/prolong.frag", **level.defines, **({"CORRECTION": 1} if rigid else {}))
         prolong(free.fields, region=level.region, **coarser.faces.read.inputs("coarse_"), **faces.inputs(),
                 alone=coarser.alone, **level.bounds)  # fmt: skip

@@ -20,9 +20,9 @@ from solver.packing import DoublePackedFaces, PackedFaces, packed, unpacked
 from solver.params import NoSlip
 from solver.viscosity.box import Box
 
-# Texels (of 2 x 2 cells) of the coarsest level, which has a dense inverse: 64 unknowns. BLAS inverts 128 in threads,
+# Texels (of 2 x 2 cells) of the coarsest level, which has a dense inverse: 96 unknowns. BLAS inverts 128 in threads,
 # which wait longer than they work.
-COARSEST = 8
+COARSEST = 12
 # Couplings of a strain with the next ones, (rows, columns) further; those backwards follow by symmetry.
 ROW_STENCIL = (0, 0), (1, 0), (2, 0)
 COLUMN_STENCIL = (0, 0), (0, 1), (0, 2)

@@ -21,9 +21,7 @@ STIFF_OF_SOFTEST = 4.0
 # Where all is viscous, stiff parts move together with the fluid between them. Coarse levels cannot represent that where
 # the parts have sharp edges, since coarse motions strain them, nor next to solids, where coarse strains are not those
 # of the fine level. There the coarse levels move parts stiffer than this times the softest cell as a whole; less stiff
-# parts may strain a little. Smooth masks take half or a third of the iterations without. F-cycles repeat the coarse
-# correction, which is overshot next to solids: it could point uphill, which ended a step of contrast 100 with 9 % of
-# error after three iterations.
+# parts may strain a little. Smooth masks take half or a third of the iterations without.
 RIGID_OF_SOFTEST = 40.0
 # Stiff parts count as sharp if at least this share of their border is an edge. It is .5 to 1 for masks of two values
 # and for noise, and 0 to .06 for smooth ones, even if these jump by far more than `MODERATE` in a few places.
@@ -64,7 +62,6 @@ class Plan:
         cycle_leaves: the fraction of the energy of any error that a cycle leaves at most, where it is known.
         stiff: dt mu / h^2 above which cores and runs are deflated; 0: none are.
         rigid: the coarse levels move each of these parts as a whole, and cut viscosity off at `stiff`.
-        full: cycles are F-cycles.
     """
 
     method: Literal["smooth", "direct", "cg"] = "cg"
@@ -74,7 +71,6 @@ class Plan:
     cycle_leaves: float = math.inf
     stiff: float = 0.0
     rigid: bool = False
-    full: bool = False
 
 
 def is_sharp(kappa: np.ndarray, solid: np.ndarray) -> bool:
@@ -123,7 +119,6 @@ def plan_for(least: float, largest: float, cells: int, is_one: bool, is_sharp: b
     count = 1 if least <= ONE_SWEEP and varies and not rigid else 2
     stiff = max(STIFF, (RIGID_OF_SOFTEST if rigid else STIFF_OF_SOFTEST) * least)
     tolerance = TOLERANCE_STIFF if varies else share * TOLERANCE_MODERATE
-    full = least > ONE_SWEEP and not is_sharp
     if largest <= stiff:
-        return Plan("cg", count, tolerance, full=full)
-    return Plan("cg", count, tolerance, stiff=stiff, rigid=rigid, full=full)
+        return Plan("cg", count, tolerance)
+    return Plan("cg", count, tolerance, stiff=stiff, rigid=rigid)

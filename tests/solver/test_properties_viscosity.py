@@ -51,7 +51,7 @@ def test_every_class_of_mask(device: Device, kind: str, contrast: float, softest
 
 @pytest.mark.parametrize(("kind", "seed"), [("hard blobs", 30), ("discs", 36), ("hard blobs", 72)])
 def test_solids_among_a_moderate_mask(device: Device, kind: str, seed: int) -> None:
-    """F-cycles, whose corrections could point uphill there, ended at 4 to 16 % of error."""
+    """F-cycles, whose corrections can point uphill there, ended at 4 to 16 % of error."""
     case = viscosity.Case.random(kind, (96, 64), 20.0, 100.0, np.random.default_rng(seed), plain=False)
     assert case.solid.any()
     assert viscosity.error(case.solved(device)[0], case.exact()) < viscosity.ERROR[1e2]
