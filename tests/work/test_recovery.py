@@ -993,6 +993,29 @@ def test_what_was_not_to_be_saved_is_offered_only_to_who_came_back_to_it(
 
 
 @pytest.mark.usefixtures("before")
+@pytest.mark.parametrize("way", ["leaves", "gives up", "opens another"])
+def test_what_was_not_restored_yet_is_offered_again(
+    starter: Starter, tmp_path: Path, root: Path, monkeypatch: pytest.MonkeyPatch, way: str
+) -> None:
+    """To who has left, or wanted something else, before its picture had been read."""
+    goes_on, load = threading.Event(), Found.load
+    monkeypatch.setattr(Found, "load", lambda found: (goes_on.wait(60), load(found))[1])
+    robot = starter.start(tmp_path)
+    (offered,) = robot.editor.recovery.offered
+    robot.editor.recovery.restore(offered)
+    assert robot.editor.files.is_loading
+    assert find(root) == ([], [])
+    if way == "leaves":
+        starter.kill()
+    elif way == "gives up":
+        robot.editor.files.give_up_loading()
+    else:
+        robot.editor.files.open(tmp_path / "pattern.png")
+    assert found_in(root).work.strokes == 2
+    goes_on.set()
+
+
+@pytest.mark.usefixtures("before")
 def test_a_picture_that_is_gone_is_told_in_the_window(starter: Starter, tmp_path: Path, root: Path) -> None:
     away = tmp_path / "away"
     away.mkdir()
