@@ -807,12 +807,24 @@ def test_a_limit_below_one_pixel_is_refused(folder: Path, fluidwarp: Run, words:
         assert "--max-pixels" in ran.stderr
 
 
-def test_a_picture_too_wide_is_refused_before_it_is_warped(folder: Path, fluidwarp: Run):
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["m.npy", "wide.png", "-o", "x.webp"], "the result is 16384 x 8 pixels, and WebP holds no side longer"),
+        (["n.npy", "cat.png", "-o", "x.webp", "--size", "20000"], "WebP holds no side longer than 16383"),
+        (["n.npy", "cat.png", "-o", "x.mp4", "--size", "20000"], "h264 holds no more than 16384 x 16384"),
+    ],
+)
+def test_a_picture_too_wide_is_refused_before_it_is_warped(
+    folder: Path, fluidwarp: Run, monkeypatch: pytest.MonkeyPatch, words: list[str], told: str
+):
+    monkeypatch.setattr("app.work.apply_job.MapSampler", lambda *given: pytest.fail("it is being warped"))
     write_picture(folder / "wide.png", Picture(np.zeros((8, 16384, 3), np.uint8)))
     write_map(folder / "m.npy", Displacement(np.zeros((8, 16384, 2), np.float32)))
-    ran = fluidwarp(folder, "apply", "m.npy", "wide.png", "-o", "x.webp")
+    write_map(folder / "n.npy", Displacement(np.zeros((48, 64, 2), np.float32)))
+    ran = fluidwarp(folder, "apply", *words)
     assert (ran.returncode, len(ran.stderr.splitlines())) == (1, 1)
-    assert "the result is 16384 x 8 pixels, and WebP holds no side longer than 16383" in ran.stderr
+    assert told in ran.stderr
 
 
 def test_primaries_that_a_format_cannot_tell_are_told(folder: Path, fluidwarp: Run):
