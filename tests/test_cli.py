@@ -807,6 +807,17 @@ def test_a_limit_below_one_pixel_is_refused(folder: Path, fluidwarp: Run, words:
         assert "--max-pixels" in ran.stderr
 
 
+def test_where_the_window_cannot_be_loaded_it_is_what_is_missing_that_is_told(
+    folder: Path, fluidwarp: Run, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setitem(sys.modules, "app.ui.window", None)
+    for words in (["edit"], ["cat.png"]):
+        ran = fluidwarp(folder, *words)
+        assert (ran.returncode, ran.stdout, len(ran.stderr.splitlines())) == (2, "", 1)
+        assert ran.stderr.startswith("fluidwarp: the window cannot be loaded (")
+        assert ran.stderr.endswith("`fluidwarp doctor` says what is missing\n")
+
+
 @pytest.mark.parametrize(
     ("words", "told"),
     [
