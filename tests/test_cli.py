@@ -597,7 +597,7 @@ def test_interrupted_leaves_nothing(folder: Path):
     assert here(folder) == before
 
 
-@pytest.mark.parametrize("moment", ["while modules are loaded", "before a job has begun"])
+@pytest.mark.parametrize("moment", ["while modules are loaded", "before a job has begun", "with something half done"])
 def test_interrupted_before_it_does_anything_it_says_so(folder: Path, moment: str):
     import signal
 
@@ -606,6 +606,12 @@ def test_interrupted_before_it_does_anything_it_says_so(folder: Path, moment: st
     begin = "from app.start import main; main()"
     if moment == "before a job has begun":
         begin = f"import app.cli\ndef wait(**_): {waiting}\napp.cli.cli = wait\n{begin}"
+    elif moment == "with something half done":
+        begin = f"""import app.cli, app.progress
+def wait(**_):
+    with app.progress.if_abandoned(lambda: print("undone", flush=True)): {waiting}
+app.cli.cli = wait
+{begin}"""
     path = os.pathsep.join([str(folder), str(ROOT)] if moment == "while modules are loaded" else [str(ROOT)])
     heard = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"  # behind `&` it would be ignored
     started = subprocess.Popen(
@@ -619,8 +625,9 @@ def test_interrupted_before_it_does_anything_it_says_so(folder: Path, moment: st
     assert started.stdout is not None
     assert started.stdout.readline() == "now\n"
     started.send_signal(signal.SIGINT)
-    _, told = started.communicate(timeout=60)
+    done, told = started.communicate(timeout=60)
     assert (started.returncode, told) == (cli.INTERRUPTED, "fluidwarp: interrupted\n")
+    assert done == "undone\n" * (moment == "with something half done")
 
 
 def test_the_window_that_is_interrupted_says_so(folder: Path, fluidwarp: Run, monkeypatch: pytest.MonkeyPatch):
