@@ -237,6 +237,20 @@ def test_doctor_finds_what_is_missing(monkeypatch: pytest.MonkeyPatch):
     assert found.mend == "pip install no-such-library"
 
 
+@pytest.mark.parametrize(
+    ("system", "said"),
+    [("linux", "no display: neither"), ("darwin", "Cocoa, OpenGL 4.1"), ("win32", "Cocoa, OpenGL 4.1")],
+)
+def test_only_on_linux_a_window_needs_the_name_of_a_display(monkeypatch: pytest.MonkeyPatch, system: str, said: str):
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    window = {"platform": "Cocoa", "opengl": "4.1"}
+    monkeypatch.setattr(doctor, "ask", lambda of, **named: window if of == "app.ui.probe" else {"error": "no OpenGL"})
+    monkeypatch.setattr(sys, "platform", system)
+    found = next(finding for finding in doctor.examine() if finding.name == "window")
+    assert found.said.startswith(said)
+
+
 def test_doctor_lists_the_graphics_devices(monkeypatch: pytest.MonkeyPatch):
     """Each is asked in a process with its number; one that does not work is told, and is not the end of the list."""
 
