@@ -859,6 +859,19 @@ def test_a_picture_too_wide_is_refused_before_it_is_warped(
     assert told in ran.stderr
 
 
+def test_a_map_that_does_not_fit_into_the_memory_is_told_with_its_size(
+    folder: Path, fluidwarp: Run, monkeypatch: pytest.MonkeyPatch
+):
+    def full(*given: object, **named: object) -> Displacement:
+        raise MemoryError
+
+    monkeypatch.setattr("app.work.export.displacement", full)
+    ran = fluidwarp(folder, "render", "a.toml", "--map", "m.exr", "--map-size", "100", "--overscan", "7")
+    told = "there is not enough memory for a map of 114 x 89 pixels; lower --map-size or --overscan"
+    assert (ran.returncode, ran.stderr) == (1, f"fluidwarp: {told}\n")
+    assert "m.exr" not in here(folder)
+
+
 def test_primaries_that_a_format_cannot_tell_are_told(folder: Path, fluidwarp: Run):
     primaries = (0.713, 0.293, 0.165, 0.83, 0.128, 0.044, 0.32168, 0.33767)
     write_picture(folder / "aces.exr", Picture(np.ones((48, 64, 3), np.float32), chromaticities=primaries))
