@@ -197,11 +197,13 @@ def test_animation_stopped_and_turned(folder: Path, fluidwarp: Run):
     (folder / "b.toml").write_text(
         RECIPE + "[stop]\ndisplacement_above = 0.03\n[time]\nreverse = true\nping_pong = true"
     )
-    ran = fluidwarp(folder, "render", "b.toml", "-o", "b.gif")
+    ran = fluidwarp(folder, "render", "b.toml", "-o", "b.gif", "--stats", "b.json")
     assert ran.returncode == 0
     assert "largest displacement 0.03" in ran.stderr
     assert ran.stderr.startswith("fluidwarp: stopped at t = ")
     assert (folder / "b.gif").read_bytes()[:6] == b"GIF89a"
+    stopped = json.loads((folder / "b.json").read_text("utf-8"))["stopped"]
+    assert stopped in ran.stderr
 
 
 def test_density_mode_moves_values(folder: Path, fluidwarp: Run):
@@ -857,6 +859,16 @@ def test_a_picture_too_wide_is_refused_before_it_is_warped(
     ran = fluidwarp(folder, "apply", *words)
     assert (ran.returncode, len(ran.stderr.splitlines())) == (1, 1)
     assert told in ran.stderr
+
+
+def test_two_results_that_a_link_makes_one_file_are_refused(folder: Path, fluidwarp: Run):
+    (folder / "dog.png").write_bytes((folder / "cat.png").read_bytes())
+    (folder / "out").mkdir()
+    (folder / "out" / "dog.png").symlink_to("cat.png")
+    ran = fluidwarp(folder, "render", "a.toml", "cat.png", "dog.png", "-o", "out")
+    assert (ran.returncode, len(ran.stderr.splitlines())) == (1, 1)
+    assert "cat.png and dog.png would both become" in ran.stderr
+    assert here(folder / "out") == {"dog.png"}
 
 
 def test_a_map_that_does_not_fit_into_the_memory_is_told_with_its_size(
