@@ -197,11 +197,13 @@ def test_animation_stopped_and_turned(folder: Path, fluidwarp: Run):
     (folder / "b.toml").write_text(
         RECIPE + "[stop]\ndisplacement_above = 0.03\n[time]\nreverse = true\nping_pong = true"
     )
-    ran = fluidwarp(folder, "render", "b.toml", "-o", "b.gif")
+    ran = fluidwarp(folder, "render", "b.toml", "-o", "b.gif", "--stats", "b.json")
     assert ran.returncode == 0
     assert "largest displacement 0.03" in ran.stderr
     assert ran.stderr.startswith("fluidwarp: stopped at t = ")
     assert (folder / "b.gif").read_bytes()[:6] == b"GIF89a"
+    stopped = json.loads((folder / "b.json").read_text("utf-8"))["stopped"]
+    assert stopped in ran.stderr
 
 
 def test_density_mode_moves_values(folder: Path, fluidwarp: Run):
@@ -235,6 +237,20 @@ def test_doctor_finds_what_is_missing(monkeypatch: pytest.MonkeyPatch):
     found = next(finding for finding in doctor.examine() if finding.name == "libraries")
     assert found.vital
     assert found.mend == "pip install no-such-library"
+
+
+@pytest.mark.parametrize(
+    ("system", "said"),
+    [("linux", "no display: neither"), ("darwin", "Cocoa, OpenGL 4.1"), ("win32", "Cocoa, OpenGL 4.1")],
+)
+def test_only_on_linux_a_window_needs_the_name_of_a_display(monkeypatch: pytest.MonkeyPatch, system: str, said: str):
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    window = {"platform": "Cocoa", "opengl": "4.1"}
+    monkeypatch.setattr(doctor, "ask", lambda of, **named: window if of == "app.ui.probe" else {"error": "no OpenGL"})
+    monkeypatch.setattr(sys, "platform", system)
+    found = next(finding for finding in doctor.examine() if finding.name == "window")
+    assert found.said.startswith(said)
 
 
 def test_doctor_lists_the_graphics_devices(monkeypatch: pytest.MonkeyPatch):
@@ -597,7 +613,7 @@ def test_interrupted_leaves_nothing(folder: Path):
     assert here(folder) == before
 
 
-@pytest.mark.parametrize("moment", ["while modules are loaded", "before a job has begun"])
+@pytest.mark.parametrize("moment", ["while modules are loaded", "before a job has begun", "with something half done"])
 def test_interrupted_before_it_does_anything_it_says_so(folder: Path, moment: str):
     import signal
 
@@ -606,6 +622,12 @@ def test_interrupted_before_it_does_anything_it_says_so(folder: Path, moment: st
     begin = "from app.start import main; main()"
     if moment == "before a job has begun":
         begin = f"import app.cli\ndef wait(**_): {waiting}\napp.cli.cli = wait\n{begin}"
+    elif moment == "with something half done":
+        begin = f"""import app.cli, app.progress
+def wait(**_):
+    with app.progress.if_abandoned(lambda: print("undone", flush=True)): {waiting}
+app.cli.cli = wait
+{begin}"""
     path = os.pathsep.join([str(folder), str(ROOT)] if moment == "while modules are loaded" else [str(ROOT)])
     heard = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"  # behind `&` it would be ignored
     started = subprocess.Popen(
@@ -619,8 +641,9 @@ def test_interrupted_before_it_does_anything_it_says_so(folder: Path, moment: st
     assert started.stdout is not None
     assert started.stdout.readline() == "now\n"
     started.send_signal(signal.SIGINT)
-    _, told = started.communicate(timeout=60)
+    done, told = started.communicate(timeout=60)
     assert (started.returncode, told) == (cli.INTERRUPTED, "fluidwarp: interrupted\n")
+    assert done == "undone\n" * (moment == "with something half done")
 
 
 def test_the_window_that_is_interrupted_says_so(folder: Path, fluidwarp: Run, monkeypatch: pytest.MonkeyPatch):
@@ -807,12 +830,58 @@ def test_a_limit_below_one_pixel_is_refused(folder: Path, fluidwarp: Run, words:
         assert "--max-pixels" in ran.stderr
 
 
-def test_a_picture_too_wide_is_refused_before_it_is_warped(folder: Path, fluidwarp: Run):
+def test_where_the_window_cannot_be_loaded_it_is_what_is_missing_that_is_told(
+    folder: Path, fluidwarp: Run, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setitem(sys.modules, "app.ui.window", None)
+    for words in (["edit"], ["cat.png"]):
+        ran = fluidwarp(folder, *words)
+        assert (ran.returncode, ran.stdout, len(ran.stderr.splitlines())) == (2, "", 1)
+        assert ran.stderr.startswith("fluidwarp: the window cannot be loaded (")
+        assert ran.stderr.endswith("`fluidwarp doctor` says what is missing\n")
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["m.npy", "wide.png", "-o", "x.webp"], "the result is 16384 x 8 pixels, and WebP holds no side longer"),
+        (["n.npy", "cat.png", "-o", "x.webp", "--size", "20000"], "WebP holds no side longer than 16383"),
+        (["n.npy", "cat.png", "-o", "x.mp4", "--size", "20000"], "h264 holds no more than 16384 x 16384"),
+    ],
+)
+def test_a_picture_too_wide_is_refused_before_it_is_warped(
+    folder: Path, fluidwarp: Run, monkeypatch: pytest.MonkeyPatch, words: list[str], told: str
+):
+    monkeypatch.setattr("app.work.apply_job.MapSampler", lambda *given: pytest.fail("it is being warped"))
     write_picture(folder / "wide.png", Picture(np.zeros((8, 16384, 3), np.uint8)))
     write_map(folder / "m.npy", Displacement(np.zeros((8, 16384, 2), np.float32)))
-    ran = fluidwarp(folder, "apply", "m.npy", "wide.png", "-o", "x.webp")
+    write_map(folder / "n.npy", Displacement(np.zeros((48, 64, 2), np.float32)))
+    ran = fluidwarp(folder, "apply", *words)
     assert (ran.returncode, len(ran.stderr.splitlines())) == (1, 1)
-    assert "the result is 16384 x 8 pixels, and WebP holds no side longer than 16383" in ran.stderr
+    assert told in ran.stderr
+
+
+def test_two_results_that_a_link_makes_one_file_are_refused(folder: Path, fluidwarp: Run):
+    (folder / "dog.png").write_bytes((folder / "cat.png").read_bytes())
+    (folder / "out").mkdir()
+    (folder / "out" / "dog.png").symlink_to("cat.png")
+    ran = fluidwarp(folder, "render", "a.toml", "cat.png", "dog.png", "-o", "out")
+    assert (ran.returncode, len(ran.stderr.splitlines())) == (1, 1)
+    assert "cat.png and dog.png would both become" in ran.stderr
+    assert here(folder / "out") == {"dog.png"}
+
+
+def test_a_map_that_does_not_fit_into_the_memory_is_told_with_its_size(
+    folder: Path, fluidwarp: Run, monkeypatch: pytest.MonkeyPatch
+):
+    def full(*given: object, **named: object) -> Displacement:
+        raise MemoryError
+
+    monkeypatch.setattr("app.work.export.displacement", full)
+    ran = fluidwarp(folder, "render", "a.toml", "--map", "m.exr", "--map-size", "100", "--overscan", "7")
+    told = "there is not enough memory for a map of 114 x 89 pixels; lower --map-size or --overscan"
+    assert (ran.returncode, ran.stderr) == (1, f"fluidwarp: {told}\n")
+    assert "m.exr" not in here(folder)
 
 
 def test_primaries_that_a_format_cannot_tell_are_told(folder: Path, fluidwarp: Run):

@@ -78,10 +78,6 @@ class OpenGesture:
             self.made = finished.value
         return self.made
 
-    def close(self) -> None:
-        """Give it up."""
-        self._drawing.close()
-
     def label_of(self, made: Made) -> str:
         """What the history calls what it has made."""
         if isinstance(made, RecipeHandle):

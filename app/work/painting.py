@@ -132,7 +132,6 @@ class Painting(Recording):
         if self._gesture is None:
             return
         self._take_up()
-        self._gesture.close()
         self._gesture, coasting = None, self.coasting
         self._show(self.document.recipe)
         if coasting:

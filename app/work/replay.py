@@ -118,12 +118,8 @@ class Replay:
         """Go to a tick, or between two: there the step from the earlier one is made, with the map carried on only by
         the part of it that has passed. The next `advance` or `seek` goes on from the whole tick.
         """
-        self._leave_passing()
         whole, part = int(position // 1), float(position % 1)
-        nearest = self.checkpoints.nearest(self.recipe, whole)
-        if whole < self.tick or (nearest is not None and nearest.tick > self.tick):
-            self._load(nearest)
-        self.pass_time(whole)
+        self.head_for(whole)
         while self.tick < whole:
             self.advance()
         if part:
@@ -132,9 +128,10 @@ class Replay:
 
     def head_for(self, tick: int) -> None:
         """Go to the last moment up to a tick that is kept, unless this one lies between; and to where all begins."""
+        self._leave_passing()
         nearest = self.checkpoints.nearest(self.recipe, tick)
         if tick < self.tick or (nearest is not None and nearest.tick > self.tick):
-            self.seek(nearest.tick if nearest is not None else 0)
+            self._load(nearest)
         self.pass_time(tick)
 
     def use(self, recipe: Recipe, keep: bool = True) -> None:

@@ -331,6 +331,8 @@ def test_data_beside_the_display_window_are_told(tmp_path: Path):
     OpenEXR.File(header, {name: noise(0, np.float32) for name in "RGB"}).write(str(tmp_path / "far.exr"))
     picture = read_picture(tmp_path / "far.exr")
     assert not picture.pixels.any()
+    assert picture.wide is None
+    assert picture.margins == (0, 0, 0, 0)
     assert picture.note == "far.exr: pixels that all lie outside of its display window are not kept"
 
 

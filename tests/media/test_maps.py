@@ -499,6 +499,7 @@ def test_what_is_no_exr_at_all_is_left_to_the_reader_of_pictures(tmp_path: Path)
     assert holds(tmp_path / "a.exr") == "picture"
     assert holds(tmp_path / "nonesuch.tif") == "picture"
     assert holds(tmp_path / "a.flo") == holds(tmp_path / "a.npy") == "map"
+    assert {holds(tmp_path / f"a.{ending}") for ending in ("png", "JPG", "webp", "gif", "mp4", "toml")} == {"picture"}
 
 
 @pytest.mark.parametrize("ending", [".flo", ".npy"])

@@ -640,6 +640,10 @@ def test_the_colours_of_an_avif_are_told(tmp_path: Path):
     )
     write_picture(tmp_path / "a.avif", Picture(smooth(3)))
     assert read_picture(tmp_path / "a.avif").note == ""
+    plain = (tmp_path / "a.avif").read_bytes()
+    assert plain.count(b"colrnclx") == 1
+    (tmp_path / "b.avif").write_bytes(plain.replace(b"colrnclx", b"freenclx"))  # which says nothing of them
+    assert read_picture(tmp_path / "b.avif").note == ""
 
 
 def test_a_jpeg_2000_of_boxes_without_end_is_read_at_once(tmp_path: Path):
@@ -798,6 +802,7 @@ def test_profile_and_metadata_are_kept_or_stripped(tmp_path: Path, ending: str):
         assert exif.get_ifd(0x8769)[0xA002] == 64
         assert b"adobe:ns:meta" in (image.info["xmp"] if "xmp" in image.info else bytes(exif[700]))
     read = read_picture(path)
+    assert read.note == ""
     assert read.icc == SRGB
     assert read.exif is not None
     again = Image.Exif()

@@ -1157,6 +1157,19 @@ def test_a_large_map_is_made_anew_a_little_in_each_step(device: Device) -> None:
     np.testing.assert_allclose(warp.read((100, 100)), found, atol=5e-4 * whole.h, err_msg="resampled on the way")
 
 
+def test_where_nothing_moves_a_remap_draws_and_copies_nothing(device: Device) -> None:
+    """What it draws once, the next one copies, as it draws into the other of two fields."""
+    warp, drawn = WarpMap(device, Grid(32, 32), (2560, 2560)), list[float]()
+    for centre in ((0.25, 0.25), (0.75, 0.75), (0.75, 0.75)):
+        warp.advance_prescribed(swirl(centre, 0.08), 0.03)
+        device.timings.take()
+        with device.stage("step"):
+            warp.remap()
+        drawn.append(round(device.timings.texel_writes["step"] / TILE**2))
+    a_quarter = 25  # of 100 tiles
+    assert drawn == [a_quarter, 2 * a_quarter, a_quarter]
+
+
 def test_restoring_under_a_brush_reaches_through_a_window(device: Device) -> None:
     whole = Grid(64, 48)
     warp = WarpMap(device, whole)

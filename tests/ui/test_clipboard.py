@@ -130,6 +130,7 @@ def test_any_picture_is_copied_with_alpha_and_pasted_without_where_it_is_opaque(
     with pytest.raises(UserError, match="There is no picture on the clipboard"):
         clipboard.paste(tmp_path / "pasted.png")
     pixels = np.random.default_rng(3).integers(0, 256, (3, 5, channels)).astype(np.uint8)
+    pixels[0, 0, -1] = 255  # opaque somewhere
     write_picture(tmp_path / "given.png", Picture(pixels))
     clipboard.give(str(tmp_path / "given.png"))
     assert board.held is not None

@@ -836,6 +836,18 @@ def test_saving_asks_for_a_name_and_where_the_picture_goes(robot: Robot, tmp_pat
     assert not projects.load(tmp_path / "small.fluidwarp").embedded
 
 
+@pytest.mark.parametrize("embeds", [True, False])
+def test_a_picture_is_kept_in_the_project_as_the_person_likes_and_then_as_it_was_saved(
+    robot: Robot, tmp_path: Path, embeds: bool
+) -> None:
+    files, likes, path = robot.editor.files, robot.editor.preferences, tmp_path / "a.fluidwarp"
+    likes.embed = embeds
+    for _ in range(2):
+        assert files.save_as(path)
+        assert projects.load(path).embedded == embeds
+        likes.embed = not embeds
+
+
 def test_a_picture_that_is_only_in_a_project_stays_there(robot: Robot, tmp_path: Path) -> None:
     assert robot.editor.files.save_as(tmp_path / "work.fluidwarp", True)
     robot.drop(tmp_path / "work.fluidwarp")

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
+from dataclasses import replace
 from datetime import datetime
 from fractions import Fraction
 from pathlib import Path
@@ -12,6 +14,8 @@ from typing import Any
 import pytest
 
 from app.media.animation import animation_writer
+from app.media.pictures import write_picture
+from app.media.project import from_picture
 from app.model.bars import Which
 from app.model.handles import RecipeHandle, RecipePin
 from app.model.recipe import Recipe
@@ -31,6 +35,7 @@ from app.ui.saving import SaveDialog
 from app.work.journal import Origin, Work
 from app.work.recovery import Found
 from solver.gl.device import Device
+from support.drawn import Drawn
 from support.editing import Robot, add_bars, pattern, small_project
 from support.laid import Laid
 
@@ -238,3 +243,64 @@ def test_nothing_is_cut_off_or_over_something_else(
                 robot.frame(count=2)
                 told |= {fault: state for fault in laid.faults(robot.frame) if fault not in told}
     assert not told, "\n".join(f"{state}: {fault}" for fault, state in told.items())
+
+
+DRAWN = ("add_", "push_clip_rect", "text_unformatted", "input_text", "combo")  # at places of the screen
+PLACES = {"add_circle": 2, "add_circle_filled": 2, "add_polyline": 6, "add_text": 2, "text_unformatted": 2}  # else 4
+ACROSS, DOWN, WIDE, THIN = 6.0, 2.0, 5.0, 0.3  # points that are no fault: of places, widths, and thicknesses
+
+
+@pytest.mark.parametrize("tour", [time, over], ids=lambda tour: tour.__name__)
+def test_at_200_percent_all_is_twice_as_far_apart_and_twice_as_large(
+    device: Device, tmp_path: Path, tour: object, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """But for what letters are rounded to, which adds up along a row."""
+    laid, drawn, told = Laid(monkeypatch), Drawn(monkeypatch), list[str]()
+    scenes: tuple[dict[str, list[str]], ...] = {}, {}
+    recipe = small_project(tmp_path).recipe
+    write_picture(tmp_path / "pattern.png", pattern(960, 720))
+    for scale, found in zip((1.0, 2.0), scenes, strict=True):
+        size, likes = (round(1280 * scale), round(800 * scale)), Preferences(auto_quality=False, scale=scale)
+        with Robot(device, from_picture(tmp_path / "pattern.png", recipe), size, preferences=likes) as robot:
+            for state in tour(robot, laid.places):  # pyright: ignore[reportCallIssue]
+                view = robot.editor.workspace.view
+                robot.editor.workspace.view = replace(view, zoom=0.8 * scale)
+                robot.move(0.1 * size[0], 0.12 * size[1])  # beside what opens
+                robot.frame(count=3)
+                laid.faults(robot.frame)  # which notes where things are
+                drawn.take()
+                robot.frame()
+                found[state] = [line for line in drawn.take() if line.startswith(DRAWN)]
+    for state, lines in scenes[0].items():
+        if not state.startswith(("Preferences", "Keyboard", "a key")):  # which show the scale itself; many rows
+            twice = scenes[1][state]
+            assert len(lines) == len(twice), state
+            told += [f"{state}: {a}    {b}" for a, b in zip(lines, twice, strict=True) if not _is_twice(a, b)]
+    assert not told, "\n".join(told[:40])
+
+
+def _is_twice(line: str, other: str) -> bool:
+    """Whether `other` is `line` twice as large; both are as `Drawn` notes them, and only lengths have a point."""
+    split = (re.sub(r"\|.*", _without_numbers, each).split(" | ") for each in (line, other))
+    (numbers, *words), (twice, *words_too) = split
+    (name, *mine), (name_too, *theirs) = numbers.split(), twice.split()
+    if (name, words, len(mine)) != (name_too, words_too, len(theirs)):
+        return False
+    places, off = PLACES.get(name, 4), list[float]()
+    for a, b in zip(mine, theirs, strict=True):
+        if "." in a and "." in b:
+            off.append(float(b) / 2 - float(a))
+        elif a != b:
+            return False
+    rest = off[places:] if name != "add_image" else []  # which part of it
+    return (
+        all(abs(each) < ACROSS for each in off[:places:2])
+        and all(abs(each) < DOWN for each in off[1:places:2])
+        and (places != 4 or abs(off[2] - off[0]) < WIDE)
+        and all(abs(each) < THIN for each in rest)
+    )
+
+
+def _without_numbers(found: re.Match[str]) -> str:
+    """Words as they are on any machine, at any size of the picture."""
+    return re.sub(r"\d[\d.]*", "0", found[0])

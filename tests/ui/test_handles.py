@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from app.model.handles import ARRIVED, MOST_HANDLES, MOST_LINES
 from app.model.recipe import Recipe
 from app.progress import Progress
 from app.ui.events import Mods
+from app.ui.theme import packed
 from app.ui.widgets import Ui
 from app.work import journal
 from app.work.export import run
@@ -25,6 +27,7 @@ from app.work.replay import Replay
 from app.work.session import Session
 from solver.gl.device import Device
 from support.commands import Run
+from support.drawn import Drawn
 from support.editing import Robot, small_project
 
 
@@ -94,6 +97,30 @@ def test_a_click_pins_a_point(robot: Robot) -> None:
     for held in robot.editor.session.held:
         assert not held.is_away
     assert robot.editor.session.held[0].now == pytest.approx((0.5, 0.5), abs=3e-3)
+
+
+def test_the_numbers_of_the_handle_in_hand_and_of_the_one_under_the_pointer_are_lit(
+    robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drag(robot, (0.3, 0.5), (0.35, 0.5))
+    drag(robot, (0.6, 0.5), (0.65, 0.5))
+    drawn, accent = Drawn(monkeypatch), f"#{packed(robot.editor.ui.palette.accent):08x}"
+
+    def lit() -> list[str]:
+        robot.frame(count=2)
+        drawn.take()
+        robot.frame()
+        lines = drawn.take()
+        boxes = [(one, line.split(" | ")[-1]) for one, line in pairwise(lines) if one.startswith("add_rect_filled")]
+        return [words for box, words in boxes if words in ("1", "2") and accent in box.split()]
+
+    robot.move(*robot.at(0.5, 0.1))
+    for selected, far, near in (("", [], ["1"]), ("handle[2]", ["2"], ["1", "2"])):
+        robot.editor.state.selected = selected
+        robot.move(*robot.at(0.5, 0.1))
+        assert lit() == far
+        robot.move(*robot.at(0.35, 0.5))
+        assert lit() == near
 
 
 def test_a_line_is_drawn_with_shift_and_dragged_as_one(robot: Robot) -> None:

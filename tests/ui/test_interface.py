@@ -328,6 +328,36 @@ def test_two_clicks_in_half_a_second_are_a_double_click(robot: Robot) -> None:
     assert robot.editor.session.recipe.fluid.viscosity == pytest.approx(0.03)
 
 
+def test_what_is_typed_into_a_slider_is_seen(robot: Robot, widgets: Widgets) -> None:
+    robot.see()
+    rect = widgets.at["Drag"]
+    robot.mods = Mods(ctrl=True)
+    robot.click(*rect.middle)
+    robot.mods = Mods()
+    robot.key("ctrl+a")
+    seen = []
+    for text in ("1", ".000000"):
+        robot.type(text)
+        robot.frame(Move(5, 5), count=3)
+        rows, columns = slice(round(rect.y), round(rect.bottom)), slice(round(rect.x), round(rect.right))
+        seen.append(robot.pixels()[rows, columns].astype(int))
+    columns = (np.abs(seen[1] - seen[0]) > 60).any(axis=(0, 2))
+    assert columns.sum() > 20  # of six digits; the cursor alone has two
+
+
+def test_the_first_hint_is_one_row(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    rows = dict[str, float]()
+    text = Ui.text
+
+    def noting(ui: Ui, words: str, *given: Any, **named: Any) -> None:
+        text(ui, words, *given, **named)
+        rows[words.split()[0]] = (imgui.get_item_rect_min().y + imgui.get_item_rect_max().y) / 2
+
+    monkeypatch.setattr(Ui, "text", noting)
+    robot.frame()
+    assert rows["Drag"] == pytest.approx(rows["Drop"], abs=1)
+
+
 @pytest.mark.parametrize("typed", ["nan", "banana", ""])
 def test_what_is_no_number_changes_nothing(robot: Robot, typed: str) -> None:
     before = robot.editor.session.recipe

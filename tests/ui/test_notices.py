@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from datetime import date, datetime
 from pathlib import Path
 from types import SimpleNamespace
@@ -82,6 +83,26 @@ def test_each_message_is_seen_for_its_five_seconds_the_newest_first() -> None:
     messages.elapse(3.0)
     assert [message.text for message in messages.shown] == ["stays"]
     assert messages.next_in is None
+
+
+def test_each_message_that_comes_or_goes_by_itself_is_told_of_once() -> None:
+    """Nobody's hand makes the frames in which its window fits itself to what is in it."""
+    changed, holds = list[int](), True
+    messages = Messages(lambda: changed.append(len(messages.shown)))
+
+    def after(doing: Callable[[], object]) -> list[int]:
+        changed.clear()
+        doing()
+        return changed
+
+    assert after(lambda: messages.warn("until it is mended", lambda: holds)) == [1]
+    assert after(lambda: messages.say("for a while")) == [2]
+    messages.see()
+    assert after(lambda: messages.elapse(1.0)) == []
+    assert after(lambda: messages.elapse(5.0)) == [1]
+    assert after(lambda: messages.elapse(5.0)) == []
+    holds = False
+    assert after(lambda: messages.elapse(0.0)) == [0]
 
 
 def test_files_of_late_are_newest_first_and_each_once(tmp_path: Path) -> None:

@@ -2,21 +2,29 @@
 
 from __future__ import annotations
 
+import json
 import platform
 from pathlib import Path
 from threading import Event, Thread
 from threading import enumerate as enumerate_threads
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from app.media.pictures import write_picture
 from app.media.project import from_picture
+from app.model.handles import RecipeHandle
+from app.ui.export_dialog import ExportDialog
 from app.ui.files import fresh_recipe, load_any
+from app.ui.preferences import Preferences
+from app.ui.quality import TICKS
 from solver.gl.device import Device
 from support.editing import Robot, pattern, small_project
-from support.gl_objects import living
+from support.gl_objects import Made, living
 from support.resources import resident
+from support.widgets import Widgets
 
 DRAWN_WITH = "Texture", "Framebuffer", "Buffer", "Query"
 
@@ -65,6 +73,58 @@ def test_many_works_need_no_more_of_the_gpu_than_a_few(device: Device, tmp_path:
     assert np.array_equal(robot.warp(), warps[1])
     robot.close()
     assert living(device, *DRAWN_WITH) == before
+
+
+class Still:
+    """A process that is at work, and gets no further."""
+
+    part, state, is_done, stopped = 0.3, "", False, 0
+
+    def __init__(self, work: Any) -> None:
+        self.job = self.fit = work
+
+    def poll(self) -> None: ...
+    def stop(self, then: object = None) -> None:
+        type(self).stopped += 1
+
+
+@pytest.mark.parametrize("under_way", ["nothing", "a measurement", "a rehearsal", "an export", "a preview", "a fit"])
+def test_closing_ends_what_is_under_way_and_frees_all_of_it(
+    device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, under_way: str
+) -> None:
+    """At once, and not when Python comes to it."""
+    made, is_new = Made(monkeypatch), under_way == "a measurement"
+    likes, project = Preferences(auto_quality=is_new, path=tmp_path / "likes.json"), small_project(tmp_path)
+    project = from_picture(tmp_path / "pattern.png", fresh_recipe()) if is_new else project
+    monkeypatch.setattr(Still, "stopped", 0)
+    monkeypatch.setattr("app.ui.export_dialog.ExportProcess", Still)
+    monkeypatch.setattr("app.ui.fitting.FitProcess", Still)
+    with Robot(device, project, preferences=likes) as robot:
+        editor = robot.editor
+        robot.key("t")
+        robot.key("]")
+        size = editor.state.brush.radius
+        if under_way == "a rehearsal":
+            editor.rehearsal.has_news = lambda: False
+        elif under_way == "an export":
+            job: Any = SimpleNamespace(target=Path("warped.png"), check=lambda: None)
+            editor.exports.start(job)
+        elif under_way == "a fit":
+            led = RecipeHandle(at=(0.4, 0.5), to=(0.5, 0.45), duration=0.1)
+            editor.session.edit("A handle", handle=(led,), duration=0.1)
+            editor.fits.start()
+        elif under_way == "a preview":
+            robot.key("ctrl+e")
+            asked = editor.dialogs.shown[-1]
+            assert isinstance(asked, ExportDialog)
+            asked.choices.finer = 1
+            Widgets(robot, monkeypatch).click("Preview")
+        robot.frame(count=TICKS)
+        assert editor.quality.is_measuring == is_new
+        assert (editor.rehearsal.trial is not None) == (under_way == "a rehearsal")
+    assert made.left == []
+    assert Still.stopped == (under_way in ("an export", "a preview", "a fit"))
+    assert json.loads((tmp_path / "likes.json").read_text("utf-8"))["brushes"]["twirl"]["radius"] == size
 
 
 def test_saved_work_that_is_left_keeps_no_thread(device: Device, tmp_path: Path) -> None:

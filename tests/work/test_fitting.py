@@ -12,7 +12,9 @@ import pytest
 
 from app.errors import Cancelled, UserError
 from app.media.auxiliary import Pictures
+from app.media.displacement import Displacement
 from app.media.landmarks import Pairs, read_pairs, write_pairs
+from app.media.maps import write_map
 from app.media.pictures import write_picture
 from app.media.recipes import read_recipe
 from app.model.picture import Picture
@@ -232,6 +234,18 @@ def test_a_line_keeps_the_shape_that_it_was_set_in(stroke: bool, device: Device)
     assert recipe.handle[-1].goals
     assert recipe.handle[-1].start == (0.4 if stroke else 0.0)
     assert recipe.fluid.viscosity == pytest.approx(0.03) if stroke else True
+
+
+@pytest.mark.parametrize("way", [1, -1])
+def test_what_is_turned_by_more_than_half_a_turn_goes_the_same_way_round(way: int, device: Device, tmp_path: Path):
+    """Little less than that is asked, after another handle has turned it a little: a fit lets both begin at once."""
+    write_map(tmp_path / "m.npy", Displacement(np.full((48, 64, 2), (0.03, 0.0), np.float32)))
+    before = f"[[handle]]\nat = [0.35, 0.45]\nrotate = {30 * way}.0\nduration = 0.3\nradius = 0.3\n"
+    line = f"[[handle]]\npoints = [[0.25, 0.45], [0.45, 0.45]]\nto = [0.35, 0.45]\nrotate = {165 * way}.0\n"
+    found = fit(device, None, 1, f'map = "{tmp_path}/m.npy"\n{FREE}{before}{line}start = 0.4\nduration = 0.3\n')
+    turned = found.trial.recipe.handle[-1].rotate
+    assert turned is not None
+    assert turned * way > 0
 
 
 def test_a_handle_that_has_let_go_before_the_end_is_left_as_it_is(device: Device):

@@ -966,6 +966,21 @@ def test_who_leaves_or_saves_is_offered_nothing(starter: Starter, tmp_path: Path
     assert files_in(root) == []
 
 
+def test_who_leaves_waits_until_the_journal_of_what_was_closed_before_is_gone(
+    starter: Starter, tmp_path: Path, root: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    discard = recovery.LockedFolder.discard
+    monkeypatch.setattr(recovery.LockedFolder, "discard", lambda held: (time.sleep(0.3), discard(held)))
+    robot = starter.start(tmp_path)
+    robot.drag((0.4, 0.5), (0.55, 0.5))
+    robot.rest()
+    robot.until(lambda: not robot.editor.recovery.is_busy)
+    assert files_in(root) != []
+    robot.editor.journals.close(robot.editor.session)
+    starter.kill()
+    assert files_in(root) == []
+
+
 @pytest.mark.parametrize("comes_back", [False, True])
 def test_what_was_not_to_be_saved_is_offered_only_to_who_came_back_to_it(
     starter: Starter, tmp_path: Path, root: Path, comes_back: bool
@@ -990,6 +1005,29 @@ def test_what_was_not_to_be_saved_is_offered_only_to_who_came_back_to_it(
     assert bool(files_in(root)) == comes_back
     if comes_back:
         assert found_in(root).work.strokes == 1
+
+
+@pytest.mark.usefixtures("before")
+@pytest.mark.parametrize("way", ["leaves", "gives up", "opens another"])
+def test_what_was_not_restored_yet_is_offered_again(
+    starter: Starter, tmp_path: Path, root: Path, monkeypatch: pytest.MonkeyPatch, way: str
+) -> None:
+    """To who has left, or wanted something else, before its picture had been read."""
+    goes_on, load = threading.Event(), Found.load
+    monkeypatch.setattr(Found, "load", lambda found: (goes_on.wait(60), load(found))[1])
+    robot = starter.start(tmp_path)
+    (offered,) = robot.editor.recovery.offered
+    robot.editor.recovery.restore(offered)
+    assert robot.editor.files.is_loading
+    assert find(root) == ([], [])
+    if way == "leaves":
+        starter.kill()
+    elif way == "gives up":
+        robot.editor.files.give_up_loading()
+    else:
+        robot.editor.files.open(tmp_path / "pattern.png")
+    assert found_in(root).work.strokes == 2
+    goes_on.set()
 
 
 @pytest.mark.usefixtures("before")

@@ -31,6 +31,7 @@ from app.work.session import Session
 from solver.gl.device import Device
 from solver.warp.distortion import MapStatistics
 from support.editing import small_project
+from support.gl_objects import Made
 
 TRIANGLE = {
     "kind": "fill", "of": "frozen", "tick": 0, "amount": 1.0,
@@ -680,6 +681,21 @@ def test_whatever_is_done_while_strokes_wait_the_recipe_is_what_is_seen(
     session.replay.seek(0)
     session.replay.seek(tick)
     assert np.array_equal(session.replay.warp.read(), seen)
+
+
+def test_a_grid_that_is_not_wanted_any_more_has_nothing_on_the_gpu(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    paint(session, "push", (0.4, 0.5), (0.5, 0.5))
+    session.settle()
+    made = Made(monkeypatch)
+    cells = 2 * session.recipe.fluid.grid
+    assert not session.prepare_grid(cells, 0.0)
+    assert made.left
+    session.forget_grid()
+    assert made.left == []
+    session.forget_grid()
+    assert not session.prepare_grid(cells, 0.0)  # from the beginning
 
 
 @pytest.mark.parametrize(("loops", "returns"), [(False, False), (True, False), (False, True)])

@@ -43,6 +43,19 @@ def test_a_subject_is_found_in_a_rough_box(hole: bool) -> None:
     assert len(outline) < 400
 
 
+@pytest.mark.parametrize("times", [1, 4])
+def test_the_outline_is_not_beside_the_subject(times: int) -> None:
+    """Also in a picture of more pixels than it is looked for in: by the middle, to a twentieth of a pixel."""
+    colours, inside = (each.repeat(times, 0).repeat(times, 1) for each in scene())
+    outline = subject_outline(colours, (0.25, 0.05, 0.85, 0.9))
+    found = Area(outline=outline).coverage(Grid(*inside.shape[::-1]), NoPictures())
+    y, x = np.indices(inside.shape)
+    for places in (x, y):
+        off = np.average(places, weights=found) - np.average(places, weights=inside)
+        assert abs(off) < 0.05 * times
+    assert found.sum() == pytest.approx(inside.sum(), rel=0.01)
+
+
 def test_where_no_subject_is_and_without_opencv_it_is_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
     plain = np.full((100, 100, 3), 90, np.uint8)
     for box in ((0.2, 0.2, 0.8, 0.8), (0.0, 0.0, 1.0, 1.0), (0.5, 0.5, 0.51, 0.51)):

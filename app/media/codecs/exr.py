@@ -54,7 +54,6 @@ def channel_names(file: Path) -> list[str]:
     """The names of the channels of an EXR's first part, by its header; raises `UserError`."""
     import OpenEXR
 
-    head_of(file)
     with decoding(file, "OpenEXR"), quiet():
         return [channel.name for channel in OpenEXR.File(str(file), header_only=True).header()["channels"]]
 
