@@ -171,6 +171,9 @@ MAC_NAMES = {name: name for name in MAC_LANGUAGES.split()} | {
     "rum": "ron", "slo": "slk", "sqi": "alb", "swe": "sve", "zho": "chi",
 }  # fmt: skip
 
+# Which libopus takes (RFC 7845, 5.1.1.2); ffmpeg makes the nearest of another, as of the 5.1(side) of AC-3.
+OPUS_LAYOUTS = "mono|stereo|3.0|quad|5.0|5.1|6.1|7.1"
+
 ANIMATIONS = {
     ".mp4": Container(
         "MP4",
@@ -185,7 +188,7 @@ ANIMATIONS = {
         {"vp9": _webm, "av1": _av1},
         even=True,
         sound=("opus", "vorbis"),
-        encoder=("-c", "libopus", "-b", "128k"),
+        encoder=("-c", "libopus", "-b", "128k", "-filter", f"aformat=channel_layouts={OPUS_LAYOUTS}"),
         roles=("forced",),
     ),
     ".mkv": Container(

@@ -42,7 +42,8 @@ def read(file: Path, max_pixels: int) -> Picture:
         colours = unusual(chunks, image.info.get("icc_profile") is not None)
         losses = [f"its colours are mixed as if sRGB, in spite of its {' and '.join(colours)}"] if colours else []
         losses += unkept
-        if (shape := image.info.get("aspect", (1, 1)))[0] != shape[1]:
+        shape = image.info.get("aspect", (1, 1))
+        if shape[0] != shape[1] and all(shape):  # with a 0 ffmpeg says that it is not known
             losses.append(f"the shape of its pixels ({shape[0]}:{shape[1]}) is not kept")
         pixels, bits = None, _bits(file)
         if image.mode == "L" and bits in (2, 4) and isinstance(key := image.info.get("transparency"), int):
