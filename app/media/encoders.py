@@ -130,8 +130,9 @@ class Container:
     """A kind of animation file: its options by codec, whether sides must be even, the sound, how often frames are read.
 
     The first codec is what it gets where none is asked for. `sound` names the codecs taken over as they are; any other
-    is turned into the first one, by the options `encoder`, in pairs. `roles` is what sound can be marked as,
-    `languages` what it calls each of those that it knows; None: it knows all, as ISO 639-2 calls them.
+    is turned into the first one, by the options `encoder`, in pairs, for the `layouts` of loudspeakers that it has;
+    None: all. `roles` is what sound can be marked as, `languages` what it calls each of those that it knows; None: it
+    knows all, as ISO 639-2 calls them.
     """
 
     name: str
@@ -139,6 +140,7 @@ class Container:
     even: bool = False
     sound: tuple[str, ...] = ()
     encoder: tuple[str, ...] = ()
+    layouts: tuple[str, ...] | None = None
     roles: tuple[str, ...] = ()
     languages: Mapping[str, str] | None = None
     passes: int = 1
@@ -171,8 +173,9 @@ MAC_NAMES = {name: name for name in MAC_LANGUAGES.split()} | {
     "rum": "ron", "slo": "slk", "sqi": "alb", "swe": "sve", "zho": "chi",
 }  # fmt: skip
 
-# Which libopus takes (RFC 7845, 5.1.1.2); ffmpeg makes the nearest of another, as of the 5.1(side) of AC-3.
-OPUS_LAYOUTS = "mono|stereo|3.0|quad|5.0|5.1|6.1|7.1"
+# What Opus and FLAC hold (RFC 7845, 5.1.1.2; RFC 9639, 9.1.3): of another ffmpeg makes the nearest for Opus, and names
+# it wrongly in FLAC. The 5.1(side) of AC-3 is 5.1 in the words of ffmpeg.
+LAYOUTS = ("mono", "stereo", "3.0", "quad", "5.0", "5.1", "6.1", "7.1")
 
 ANIMATIONS = {
     ".mp4": Container(
@@ -188,7 +191,8 @@ ANIMATIONS = {
         {"vp9": _webm, "av1": _av1},
         even=True,
         sound=("opus", "vorbis"),
-        encoder=("-c", "libopus", "-b", "128k", "-filter", f"aformat=channel_layouts={OPUS_LAYOUTS}"),
+        encoder=("-c", "libopus", "-b", "128k", "-filter", f"aformat=channel_layouts={'|'.join(LAYOUTS)}"),
+        layouts=LAYOUTS,
         roles=("forced",),
     ),
     ".mkv": Container(
@@ -196,6 +200,7 @@ ANIMATIONS = {
         {"ffv1": lossless},
         sound=("flac", "aac", "mp3", "ac3", "opus", "vorbis"),
         encoder=("-c", "flac"),
+        layouts=LAYOUTS,
         roles=(*ROLES, "original"),
     ),
     ".mov": Container(
@@ -274,10 +279,14 @@ def unheld_of_clip(
     else:
         other = dict.fromkeys(sound for sound in clip.sounds if sound not in (*container.sound, "none"))
         losses = [f"its sound ({' '.join(other)}) becomes {container.sound[0]}"] if other else []
+        turned = [layout for sound, layout in zip(clip.sounds, clip.layouts, strict=False) if sound in other]
+        known = container.layouts
+        if known and (moved := [layout for layout in turned if layout.removesuffix("(side)") not in (*known, "")]):
+            losses.append(f"the loudspeakers of its sound ({', '.join(dict.fromkeys(moved))}) become others")
         if dropped := [role for role in clip.roles if role not in container.roles]:
             losses.append(f"what its sound is marked as ({', '.join(dropped)}) is not kept")
-        known = container.languages
-        if unknown := [language for language in clip.languages if known is not None and language not in known]:
+        spoken = container.languages
+        if unknown := [language for language in clip.languages if spoken is not None and language not in spoken]:
             losses.append(f"what its sound is spoken in ({', '.join(unknown)}) is not kept")
         if container.even and size is not None and (size[0] % 2 or size[1] % 2):
             losses.append(f"its last pixels are repeated, as {container.name} has no odd sides")

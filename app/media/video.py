@@ -178,6 +178,7 @@ def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Vid
         fps=fps,
         frames=max(1, round((seconds - late) * fps)) if seconds is not None else None,
         sounds=tuple(track.codec for track in sounds),
+        layouts=tuple(track.layout for track in sounds),
         roles=tuple(dict.fromkeys(role for track in sounds for role in track.roles)),
         languages=tuple(dict.fromkeys(track.language for track in sounds if track.language)),
         late=late,
@@ -297,12 +298,14 @@ class SoundTrack:
         name: what an MP4 or MOV calls it; ffmpeg takes it over as a title from other containers only.
         roles: what it is for, such as comment or forced, besides default.
         language: three letters of ISO 639-2; "" if it does not say.
+        layout: of its channels, as 5.1(side); "" if there is none.
     """
 
     codec: str
     name: str
     roles: tuple[str, ...]
     language: str
+    layout: str = ""
 
 
 def sound_tracks(path: str | os.PathLike[str]) -> list[SoundTrack]:
@@ -320,7 +323,16 @@ def _sounds(told: str) -> list[SoundTrack]:
             codec, name = re.match(r"\w+", words), re.search(r"^ +name +: (.*?) *$", lines, re.MULTILINE)
             roles = [role for role in re.findall(r" \(([a-z ]+)\)", words) if role != "default"]
             spoken = "" if language == "und" else language
-            tracks.append(SoundTrack(codec[0] if codec else "none", name[1] if name else "", tuple(roles), spoken))
+            layout = re.search(r" Hz, ([^, ]+)", words)
+            tracks.append(
+                SoundTrack(
+                    codec[0] if codec else "none",
+                    name[1] if name else "",
+                    tuple(roles),
+                    spoken,
+                    layout[1] if layout else "",
+                )
+            )
     return tracks
 
 

@@ -804,6 +804,17 @@ def test_a_sound_track_keeps_its_language_or_that_is_told(tmp_path: Path) -> Non
         assert ("what its sound is spoken in (nob) is not kept" in told) == (ending == ".mov")
 
 
+def test_sound_of_a_cinema_goes_into_any_container(tmp_path: Path) -> None:
+    """AC-3, which films have, calls the loudspeakers behind side ones, and libopus knows none."""
+    noise = ["-f", "lavfi", "-i", "anoisesrc=d=0.3,aformat=channel_layouts=5.1(side)", "-c:a", "eac3"]
+    clip = generate(tmp_path / "in.mkv", "testsrc=s=64x48:r=10:d=0.3", *noise)
+    assert read_clip(clip).layouts == ("5.1(side)",)
+    for ending in (".webm", ".mkv", ".mp4", ".mov"):
+        save(tmp_path / f"a{ending}", 3, 10, sound=clip, frames=3)
+        assert probe(tmp_path / f"a{ending}")[1]["channels"] == 6
+        assert "loudspeakers" not in unheld_of_clip(f"a{ending}", None, replace(read_clip(clip), bits=8))
+
+
 def test_what_else_a_clip_holds_is_told(tmp_path: Path):
     told = tmp_path / "told.txt"
     told.write_text(";FFMETADATA1\ntitle=A day\nartist=Me\n[CHAPTER]\nTIMEBASE=1/1\nSTART=0\nEND=1\ntitle=Morning\n")
@@ -862,6 +873,12 @@ def test_sound_and_times_that_a_format_has_no_room_for_are_told(tmp_path: Path):
     marked = replace(clip, sounds=("aac",), roles=("dub", "forced"))
     assert unheld_of_clip("a.mp4", None, marked) == unheld_of_clip("a.mkv", None, marked) == ""
     assert unheld_of_clip("a.mov", None, marked) == "a.mov: what its sound is marked as (dub, forced) is not kept"
+    for layouts, moved in ((("stereo", "5.1(side)", ""), ""), (("2.1", "4.0", ""), "4.0"), (("", "2.1", "7.0"), "2.1")):
+        spread = replace(clip, layouts=layouts)
+        said = f"; the loudspeakers of its sound ({moved}) become others" if moved else ""
+        assert unheld_of_clip("a.mkv", None, spread) == f"a.mov: its sound (pcm_s24le) becomes flac{said}"
+        assert unheld_of_clip("a.mov", None, spread) == ""
+    assert "its sound (2.1, 4.0) become" in unheld_of_clip("a.webm", None, replace(clip, layouts=("2.1", "4.0", "")))
     assert "becomes opus; what its sound is marked as (dub) is not kept" in unheld_of_clip("a.webm", None, marked)
     assert unheld_of_clip("a.mov", None, clip, (63, 48)) == (
         "a.mov: its last pixels are repeated, as ProRes has no odd sides"

@@ -103,9 +103,10 @@ def read(file: Path, max_pixels: int, place: int | None = None) -> Picture:
         photometric = tifffile.PHOTOMETRIC(page.photometric).name
         if photometric == "YCBCR" and int(page.compression) not in DECODED:
             raise UserError(f"Cannot read {file}: a TIFF in YCbCr is not supported but as JPEG; convert it to RGB.")
-        kinds = bits if isinstance(bits := page.bitspersample, tuple) else (bits,)
-        if len(kinds) > 1 or 16 < kinds[0] < 32:  # of which tifffile does not heed the order of bytes
-            named = ", ".join(map(str, kinds[:4]))
+        told: Any = page.bitspersample
+        bits = told if isinstance(told, int) else 0
+        if not bits or 16 < bits < 32:  # of which tifffile does not heed the order of bytes
+            named = bits or ", ".join(map(str, told[:4]))
             raise UserError(
                 f"Cannot read {file}: {named} bits a channel of a TIFF are not supported; convert it to 16."
             )
@@ -131,8 +132,8 @@ def read(file: Path, max_pixels: int, place: int | None = None) -> Picture:
     if photometric == "PALETTE":
         pixels = _palette(tags[320])[pixels[..., 0] if bits > 1 else pixels[..., 0] >> 7]
     elif photometric == "SEPARATED":
-        pixels, icc, told = cmyk_to_rgb(pixels, icc)
-        losses.append(told)
+        pixels, icc, turned = cmyk_to_rgb(pixels, icc)
+        losses.append(turned)
     elif photometric == "MINISWHITE" and pixels.dtype != np.float32:
         pixels = _ink_to_light(pixels, premultiplied)
     elif photometric not in ("MINISBLACK", "RGB", "YCBCR"):
