@@ -9,7 +9,7 @@ import numpy as np
 
 from app.errors import UserError
 from app.media.clip import Clip, frame_of
-from app.media.displacement import cropped, folds
+from app.media.displacement import cropped, folds, is_beside
 from app.media.maps import read_map
 from app.media.pictures import read_picture
 from app.media.project import frame_numbers
@@ -76,6 +76,8 @@ class Pictures:
                     "fill them where the map was made."
                 )
             self._maps[name] = cropped(given.fitted(*size)).values
+            if is_beside(self._maps[name]):
+                self.notice(f"{name} looks up nothing inside of the picture; give a map that does")
             if folded := folds(self._maps[name]):
                 self.notice(f"{name} folds over itself in {folded} of its pixels")
         return self._maps[name]

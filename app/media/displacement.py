@@ -135,6 +135,18 @@ def folds(values: np.ndarray) -> int:
     return count
 
 
+def is_beside(values: np.ndarray) -> bool:
+    """Whether a map, its values (h, w, 2) in longer sides and NaN where there is nothing, looks up no point inside."""
+    height, width = values.shape[:2]
+    longest = max(width, height)
+    x, y = ((np.arange(count) + 0.5) / longest for count in (width, height))
+    for rows in _strips(values):
+        across, down = x + values[rows, :, 0], y[rows, None] + values[rows, :, 1]
+        if ((across >= 0) & (across <= width / longest) & (down >= 0) & (down <= height / longest)).any():
+            return False
+    return True
+
+
 def _strips(array: np.ndarray) -> Iterator[slice]:
     rows = max(1, 500_000 // max(1, array[0].size))
     for top in range(0, len(array), rows):

@@ -103,10 +103,10 @@ def read(file: Path, max_pixels: int, place: int | None = None) -> Picture:
         photometric = tifffile.PHOTOMETRIC(page.photometric).name
         if photometric == "YCBCR" and int(page.compression) not in DECODED:
             raise UserError(f"Cannot read {file}: a TIFF in YCbCr is not supported but as JPEG; convert it to RGB.")
-        told: Any = page.bitspersample
+        told = page.bitspersample
         bits = told if isinstance(told, int) else 0
         if not bits or 16 < bits < 32:  # of which tifffile does not heed the order of bytes
-            named = bits or ", ".join(map(str, told[:4]))
+            named = str(told).strip("()")
             raise UserError(
                 f"Cannot read {file}: {named} bits a channel of a TIFF are not supported; convert it to 16."
             )
