@@ -11,6 +11,8 @@ import numpy as np
 PixelPlaces = Literal["centres", "corners", "pixels"]
 """The places an ST map that does nothing holds in a row of W pixels, times W: .5 to W-.5, 0 to W, 0 to W-1."""
 
+LEAST = 6  # pixels along a side of a map that the solver takes
+
 
 class MapError(ValueError):
     """A map cannot be used; the reason and the mend, in words that follow the name of its file."""
@@ -66,6 +68,15 @@ def check_proportions(size: tuple[int, int], picture: tuple[int, int]) -> None:
         raise MapError(
             f"it is {columns} x {rows} and the picture {width} x {height}, and they must have the same proportions; "
             "crop the picture or make the map anew"
+        )
+
+
+def check_size(displacement: Displacement) -> None:
+    """Raise `MapError` if a map is too small to be looked up between its pixels."""
+    if min(displacement.width, displacement.height) < LEAST:
+        raise MapError(
+            f"it is {displacement.width} x {displacement.height} pixels, and a side must have at least {LEAST}; "
+            "make a larger one"
         )
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from app.media.displacement import Displacement, MapError, cropped, folds, is_beside
+from app.media.displacement import Displacement, MapError, check_size, cropped, folds, is_beside
 from app.media.files import is_sequence
 from app.work.export import Target, looked_up, opaque_value, with_alpha
 from app.work.layers import widened
@@ -62,6 +62,7 @@ class MapSampler:
         return found if self._outside is None else emptied(found, self._outside, target.how.edges, target.alpha)
 
     def _take(self, given: Displacement, pixels: np.ndarray) -> None:
+        check_size(given)
         if self._map is not None:
             self._map.release()
         inverse = inverted(self._device, given) if given.forward else given
@@ -104,6 +105,7 @@ def inverted(device: Device, given: Displacement) -> Displacement:
     Raises:
         MapError: if the map has holes, or is too small, too narrow or too large to be looked up.
     """
+    check_size(given)
     values = cropped(given).values
     if np.isnan(values).any():
         raise MapError("it is NaN in places, and cannot be inverted; fill it first")

@@ -481,8 +481,8 @@ def test_what_cannot_be_written(device: Device, clip: Path, picture: Path, tmp_p
     with pytest.raises(UserError, match=r"a map cannot show a dissolve; leave out .*m\.%02d\.exr, or 'time.dissolve'"):
         render(device, loop, picture, tmp_path / "out.mp4", maps=sequence)
     write_map(tmp_path / "m.npy", Displacement(np.zeros((HEIGHT, WIDTH, 2), np.float32)))
-    with pytest.raises(UserError, match="do not make a still"):
-        apply(device, tmp_path / "m.npy", clip, tmp_path / "out.png")
+    with pytest.raises(UserError, match="several maps do not make a still"):
+        apply(device, tmp_path / "m.%03d.npy", picture, tmp_path / "out.png")
     with pytest.raises(UserError, match="do not make an animation"):
         apply(device, tmp_path / "m.npy", picture, tmp_path / "out.gif")
     with pytest.raises(UserError, match="there is no such file"):
