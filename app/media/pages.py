@@ -7,7 +7,7 @@ from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
-from itertools import accumulate
+from itertools import accumulate, islice
 from math import gcd, lcm
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ import numpy as np
 
 from app.errors import Cancelled, UserError
 from app.media.clip import DEEP, SHALLOW, WHOLE, FileClip, FrameRange, has_changed
-from app.media.codecs import pillow, tiff
+from app.media.codecs import apng, pillow, tiff
 from app.media.codecs.decoding import decoding, head_of
 from app.media.formats import kind_of
 from app.media.inputs import MAX_PIXELS, SIZE, open_input, state_of
@@ -100,6 +100,9 @@ class Pages(FileClip):
     def _page(self, place: int) -> Picture:
         if self.kind == "TIFF":
             return tiff.read(self.path, self.max_pixels, place)
+        if self.kind == "PNG" and (found := apng.read(self.path)) is not None:
+            shown = next(islice(found.shown(), place, None))
+            return Picture(np.ascontiguousarray(shown if self.alpha else shown[..., :3]))
         with pillow.opened(ANIMATED[self.kind], self.path, self.max_pixels) as image:
             image.seek(place)
             return Picture(_pixels(image, self.alpha))
@@ -144,20 +147,33 @@ def read_pages(path: Path, first: Picture, max_pixels: int = MAX_PIXELS) -> Page
 
 def _animation(name: str, path: Path, max_pixels: int) -> tuple[list[int], list[Fraction], bool, int]:
     """The places and durations, in seconds, of an animation's frames, whether any has alpha, and how often it plays."""
+    if name == "PNG":
+        with pillow.opened(name, path, max_pixels):  # which is not too large
+            found = apng.read(path)
+        if found is None:
+            return [], [], False, 0
+        least = [canvas[..., 3].min() for canvas in found.shown()]
+        durations = [_shown_for(one.seconds * 1000) for one in found.frames]
+        return list(range(len(least))), durations, bool(min(least) < 255), found.plays
     with pillow.opened(name, path, max_pixels) as image:
         if not getattr(image, "is_animated", False):
             return [], [], False, 0
-        places = list(range(int(getattr(image, "default_image", False)), image.n_frames))  # a PNG for other readers
+        places = list(range(image.n_frames))
         durations, alpha = [], False
         for place in places:
             image.seek(place)
             image.load()
-            durations.append(Fraction(image.info.get("duration") or UNTOLD).limit_denominator(1000) / 1000)
+            durations.append(_shown_for(Fraction(image.info.get("duration") or 0)))
             alpha = alpha or (image.has_transparency_data and _pixels(image, True)[..., 3].min() < 255)
         loops = image.info.get("loop")
         # a GIF tells how often it begins again, or nothing if it does not
         plays = loops or 0 if name != "GIF" else 1 if loops is None else loops + 1 if loops else 0
         return places, durations, bool(alpha), plays
+
+
+def _shown_for(milliseconds: Fraction) -> Fraction:
+    """The seconds that a frame is shown."""
+    return (milliseconds or Fraction(UNTOLD)).limit_denominator(1000) / 1000
 
 
 def _pixels(image: Any, alpha: bool) -> np.ndarray:
