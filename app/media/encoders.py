@@ -15,20 +15,25 @@ from app.media.clip import USUAL, Clip, Colours, uncoded
 from app.media.files import NUMBER, is_sequence, writable
 from app.media.formats import FORMATS, check_picture_output, fits_profile
 from app.media.losses import lost, unusual_colours
-from app.media.video import NAMES
+from app.media.video import NAMES, WHITE
 from app.model.picture import Picture
 
 
-def tagged(colours: Colours) -> str:
-    """The filters that give a video the tags players go by: the frames' own overrule those given to the encoder."""
+def tagged(colours: Colours, bits: int) -> str:
+    """The filters that make limited YUV of RGB of so many bits, with the tags players go by.
+
+    The frames' own tags overrule those given to the encoder.
+    """
+    lowered = TO_WHITE if bits > 8 else ""
     matrix, tags = colours.matrix, f"color_primaries={colours.primaries}:color_trc={colours.transfer}"
     scaled = f"scale=out_color_matrix={matrix}:out_range=tv:flags=accurate_rnd+full_chroma_int+lanczos"
-    return f"{scaled},setparams=colorspace={matrix}:{tags}:range=tv"
+    return f"{lowered}{scaled},setparams=colorspace={matrix}:{tags}:range=tv"
 
 
 # palettegen counts every colour it meets: among 64 levels a channel it is 20 times faster, as good, and bounded
 SIX_BITS = "lutrgb=" + ":".join(f"{channel}='round(val*63/255)*255/63'" for channel in "rgb")
 ON_BLACK = "format=gbrap,premultiply=inplace=1,format=gbrp,"
+TO_WHITE = "lutrgb=" + ":".join(f"{channel}='val*{WHITE}/65535+0.5'" for channel in "rgb") + ","
 
 
 @dataclass(frozen=True)
@@ -44,7 +49,8 @@ class Stream:
     @property
     def on_black(self) -> str:
         """The filters for a codec without alpha."""
-        return (ON_BLACK if self.alpha else "") + tagged(self.colours)
+        # In 8 bits, as ffmpeg 9 makes white black where it multiplies 16.
+        return ON_BLACK + tagged(self.colours, 8) if self.alpha else tagged(self.colours, self.bits)
 
     def crf_or(self, usual: int) -> list[str]:
         """The constant rate factor, the usual one where no quality is asked for."""
@@ -78,7 +84,7 @@ def _h265(stream: Stream) -> list[str]:
 def _webm(stream: Stream) -> list[str]:
     quality = ["-c:v", "libvpx-vp9", "-b:v", "0", *stream.crf_or(24), "-row-mt", "1"]
     speed, kind = ["-deadline", "good", "-cpu-used", "4"], "yuva420p" if stream.alpha else "yuv420p"
-    return ["-vf", tagged(stream.colours), "-pix_fmt", kind, *quality, *speed, *SAME_AGAIN]
+    return ["-vf", tagged(stream.colours, stream.bits), "-pix_fmt", kind, *quality, *speed, *SAME_AGAIN]
 
 
 def _av1(stream: Stream) -> list[str]:
@@ -104,7 +110,7 @@ def lossless(stream: Stream) -> list[str]:
 
 def _prores(stream: Stream) -> list[str]:
     kind = ["-profile:v", "4444", "-pix_fmt", "yuva444p10le" if stream.alpha else "yuv444p10le", "-vendor", "apl0"]
-    return ["-vf", tagged(stream.colours), "-c:v", "prores_ks", *kind]
+    return ["-vf", tagged(stream.colours, stream.bits), "-c:v", "prores_ks", *kind]
 
 
 def _prores_422_hq(stream: Stream) -> list[str]:
