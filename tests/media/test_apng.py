@@ -1,4 +1,4 @@
-"""Frames of an animated PNG, against the laws of alpha in float64 and against ffmpeg; and damaged ones."""
+"""Frames of an animated PNG or GIF, against the laws of alpha in float64 and against ffmpeg; and damaged ones."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ def test_frames_of_16_bits_are_read_in_8(tmp_path: Path, colour: int):
     pixels = np.random.default_rng(colour).integers(0, 65536, (2, HEIGHT, WIDTH, channels))
     data = encoded([(0, 0, pixels[0], 0, 0), (0, 0, pixels[1], 0, 0)], colour=colour, bits=16)
     (path := tmp_path / "a.png").write_bytes(data)
-    found = apng.read(path)
+    found = apng.read(path.read_bytes())
     assert found is not None
     for canvas, wanted in zip(found.shown(), pixels >> 8, strict=True):
         colours = wanted[..., :1].repeat(3, axis=2) if channels < 3 else wanted[..., :3]
@@ -134,7 +134,7 @@ def test_times_and_transparent_colours_of_frames(tmp_path: Path):
     key = chunk(b"tRNS", struct.pack(">H", 1))
     data = encoded([(0, 0, grey, 0, 0), (0, 0, 1 - grey, 0, 0)], colour=0, more=key)
     (path := tmp_path / "a.png").write_bytes(data)
-    found = apng.read(path)
+    found = apng.read(path.read_bytes())
     assert found is not None
     assert [frame.seconds for frame in found.frames] == [Fraction(1, 10), Fraction(2, 10)]
     first, second = (canvas.copy() for canvas in found.shown())
@@ -145,7 +145,7 @@ def test_times_and_transparent_colours_of_frames(tmp_path: Path):
     path.write_bytes(
         short[: control + 26] + struct.pack(">I", zlib.crc32(short[control - 4 : control + 26])) + short[control + 30 :]
     )
-    again = apng.read(path)
+    again = apng.read(path.read_bytes())
     assert again is not None
     assert again.frames[0].seconds == Fraction(1, 100)
 
@@ -170,6 +170,52 @@ def test_a_damaged_animation_is_told_as_that(tmp_path: Path, fault: str):
         read_pages(path, read_picture(path))
 
 
+def gif(parts: Sequence[tuple[int, int, np.ndarray, int, int | None]], colours: np.ndarray) -> bytes:
+    """A GIF of eight colours: x, y, the numbers of colours, what becomes of it, and the number that is none."""
+    data = b"GIF89a" + struct.pack("<HHBBB", WIDTH, HEIGHT, 0xF2, 0, 0) + colours.astype(np.uint8).tobytes()
+    for x, y, numbers, disposal, key in parts:
+        data += struct.pack("<BBBBHBB", 0x21, 0xF9, 4, disposal << 2 | (key is not None), 10, key or 0, 0)
+        data += struct.pack("<BHHHHB", 0x2C, x, y, numbers.shape[1], numbers.shape[0], 0)
+        # Of 4 bits each: a code that clears before what would need 5, the numbers, and the end.
+        codes = [code for at, one in enumerate(numbers.ravel()) for code in ([8] * (at % 6 == 0) + [int(one)])] + [9]
+        nibbles = [*codes, 0][: len(codes) + len(codes) % 2]
+        packed = bytes(low | high << 4 for low, high in zip(nibbles[::2], nibbles[1::2], strict=True))
+        blocks = [packed[at : at + 255] for at in range(0, len(packed), 255)]
+        data += b"\3" + b"".join(bytes([len(block)]) + block for block in blocks) + b"\0"
+    return data + b";"
+
+
+@pytest.mark.parametrize("key", [None, 5])
+def test_what_a_gif_clears_is_transparent_though_its_first_frame_is_opaque(tmp_path: Path, key: int | None):
+    rng = np.random.default_rng(0)
+    colours, numbers = rng.integers(0, 256, (8, 3)), rng.integers(0, 8, (4, HEIGHT, WIDTH))
+    parts = [
+        (0, 0, numbers[0], 1, key),
+        (2, 1, numbers[1][:6, :7], 2, 3),
+        (8, 4, numbers[2][:5, :5], 3, 1),
+        (1, 1, numbers[3][:3, :3], 0, 2),
+    ]
+    (path := tmp_path / "a.gif").write_bytes(gif(parts, colours))
+    clip = read_pages(path, read_picture(path))
+    assert clip is not None
+    over = [
+        (
+            x,
+            y,
+            np.dstack([colours[part], np.where(part == none, 0, 255)[..., None]]),
+            {1: 0, 0: 0, 2: 1, 3: 2}[disposal],
+            1,
+        )
+        for x, y, part, disposal, none in parts
+    ]
+    for (_, read), wanted in zip(clip.pictures(), composed(over), strict=True):
+        seen = wanted[..., 3] > 0
+        np.testing.assert_array_equal(read.pixels[..., 3] > 0, seen)
+        np.testing.assert_array_equal(read.pixels[seen], wanted[seen])
+    (_, later), *_ = clip.pictures((2, None))
+    np.testing.assert_array_equal(later.pixels[..., 3], composed(over)[2][..., 3])
+
+
 def test_a_still_is_no_animation(tmp_path: Path):
     Image.new("RGB", (8, 8)).save(tmp_path / "a.png")
-    assert apng.read(tmp_path / "a.png") is None
+    assert apng.read((tmp_path / "a.png").read_bytes()) is None

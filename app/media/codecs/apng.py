@@ -5,75 +5,20 @@ Pillow pastes frames: where one is half transparent the result is too, on whatev
 
 from __future__ import annotations
 
-import io
 import struct
 import zlib
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
-from pathlib import Path
 
-import numpy as np
-
-from app.media.codecs.png import spread_key
+from app.media.codecs.layered import Animation, Frame
 
 SIGNATURE = 8
-NONE, BACKGROUND, PREVIOUS = range(3)  # what becomes of a frame when the next one comes
 KEPT = (b"PLTE", b"tRNS")
 HUNDREDTHS = 100  # of a second are the steps of a frame that names none
 
 
-@dataclass(frozen=True)
-class Frame:
-    """A frame as the file has it.
-
-    Attributes:
-        x, y, width, height: its place.
-        seconds: that it is shown.
-        disposal: one of the three above.
-        is_over: it is laid over what is there, and does not replace it.
-        file: a PNG of it alone.
-    """
-
-    x: int
-    y: int
-    width: int
-    height: int
-    seconds: Fraction
-    disposal: int
-    is_over: bool
-    file: bytes
-
-    @property
-    def place(self) -> tuple[slice, slice]:
-        return slice(self.y, self.y + self.height), slice(self.x, self.x + self.width)
-
-
-@dataclass(frozen=True)
-class Animation:
-    """The frames in a file, its width and height, and how often it is played, 0 for ever."""
-
-    size: tuple[int, int]
-    frames: Sequence[Frame]
-    plays: int
-
-    def shown(self) -> Iterator[np.ndarray]:
-        """What is seen of each frame in turn, (h, w, 4) uint8; the array is drawn on for the next."""
-        canvas = np.zeros((self.size[1], self.size[0], 4), np.uint8)
-        for number, frame in enumerate(self.frames):
-            before = canvas[frame.place].copy()
-            drawn = _decoded(frame)
-            canvas[frame.place] = _over(drawn, before) if frame.is_over else drawn
-            yield canvas
-            if frame.disposal == PREVIOUS and number:
-                canvas[frame.place] = before
-            elif frame.disposal != NONE:
-                canvas[frame.place] = 0
-
-
-def read(file: Path) -> Animation | None:
+def read(data: bytes) -> Animation | None:
     """What is in a file; None if it is no animation. Raises `ValueError` if it is damaged."""
-    data = file.read_bytes()
     head, told, kept, frames, control, pieces = b"", (0, 0), [], [], None, list[bytes]()
     for kind, body in _chunks(data):
         match kind:
@@ -129,31 +74,3 @@ def _frame(control: bytes, head: bytes, kept: Sequence[tuple[bytes, bytes]], pie
     )
     seconds = Fraction(above, below or HUNDREDTHS)
     return Frame(x, y, width, height, seconds, disposal, blend == 1, b"\x89PNG\r\n\x1a\n" + file)
-
-
-def _decoded(frame: Frame) -> np.ndarray:
-    """The pixels (h, w, 4) of a frame, in 8 bits."""
-    from PIL import Image
-
-    bits = frame.file[SIGNATURE + 16]
-    if bits == 16:
-        import imagecodecs
-
-        deep = (imagecodecs.png_decode(frame.file) >> 8).astype(np.uint8)
-        deep = deep.reshape(frame.height, frame.width, -1)
-        grey, alpha = deep.shape[2] < 3, deep.shape[2] in (2, 4)
-        opaque = deep[..., -1:] if alpha else np.full_like(deep[..., :1], 255)
-        return np.concatenate([deep[..., [0, 0, 0] if grey else [0, 1, 2]], opaque], axis=2)
-    with Image.open(io.BytesIO(frame.file), formats=["PNG"]) as image:
-        spread_key(image, bits)
-        return np.asarray(image.convert("RGBA"))
-
-
-def _over(drawn: np.ndarray, below: np.ndarray) -> np.ndarray:
-    """Straight colours (h, w, 4) over others; what covers all or nothing changes no bit."""
-    own = drawn[..., 3:].astype(np.float32) / 255
-    rest = below[..., 3:].astype(np.float32) / 255 * (1 - own)
-    alpha = own + rest
-    colours = (drawn[..., :3] * own + below[..., :3] * rest) / np.where(alpha > 0, alpha, 1)
-    mixed = (np.concatenate([colours, 255 * alpha], axis=2) + 0.5).astype(np.uint8)
-    return np.where(drawn[..., 3:] == 255, drawn, np.where(drawn[..., 3:] == 0, below, mixed))
