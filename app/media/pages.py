@@ -157,9 +157,8 @@ def _animation(name: str, path: Path, max_pixels: int) -> tuple[list[int], list[
             found = _layered(name, path)
         if found is None:
             return [], [], False, 0
-        least = [canvas[..., 3].min() for canvas in found.shown()]
         durations = [_shown_for(one.seconds * 1000) for one in found.frames]
-        return list(range(len(least))), durations, bool(min(least) < 255), found.plays
+        return list(range(len(durations))), durations, found.has_alpha(), found.plays
     with pillow.opened(name, path, max_pixels) as image:
         if not getattr(image, "is_animated", False):
             return [], [], False, 0

@@ -115,6 +115,27 @@ def test_what_is_cleared_is_transparent_though_no_frame_is(tmp_path: Path):
     assert [(read.pixels[..., 3] == 0).sum() for _, read in clip.pictures()] == [0, 0, 16]
 
 
+def test_an_animation_has_alpha_only_where_something_is_seen_through(tmp_path: Path):
+    whole, part = np.full((HEIGHT, WIDTH, 4), 255), np.full((4, 4, 4), 255)
+    clear = part - [0, 0, 0, 255]
+    for parts, seen in {
+        "whole": ([(0, 0, whole, 1, 0), (0, 0, whole, 0, 0)], False),
+        "left bare": ([(0, 0, whole, 1, 0), (0, 0, part, 0, 0)], True),
+        "bare at the end": ([(0, 0, whole, 0, 0), (0, 0, part, 1, 0)], False),
+        "covered again": ([(0, 0, whole, 0, 0), (2, 2, part, 1, 0), (2, 2, part, 0, 0)], False),
+        "one aside": ([(0, 0, whole, 0, 0), (2, 2, part, 1, 0), (3, 2, part, 0, 0)], True),
+        "one above": ([(0, 0, whole, 0, 0), (2, 2, part, 1, 0), (2, 1, part, 0, 0)], True),
+        "as before": ([(0, 0, whole, 0, 0), (2, 2, part, 2, 0), (3, 2, part, 0, 0)], False),
+        "nothing before": ([(0, 0, whole, 2, 0), (3, 2, part, 0, 0)], True),
+        "see-through": ([(0, 0, whole, 0, 0), (2, 2, clear, 0, 0)], True),
+        "laid over": ([(0, 0, whole, 0, 0), (2, 2, clear, 0, 1)], False),
+    }.values():
+        found = apng.read(encoded(parts))
+        assert found is not None
+        assert found.has_alpha() == seen
+        assert any(canvas[..., 3].min() < 255 for canvas in found.shown()) == seen
+
+
 @pytest.mark.parametrize("colour", [0, 2, 4, 6])
 def test_frames_of_16_bits_are_read_in_8(tmp_path: Path, colour: int):
     channels = {0: 1, 2: 3, 4: 2, 6: 4}[colour]

@@ -36,6 +36,12 @@ class Frame:
     is_over: bool
     file: bytes
 
+    def covers(self, other: Frame) -> bool:
+        """Whether nothing of the other's place is beyond its own."""
+        right, bottom = self.x + self.width, self.y + self.height
+        beyond = other.x + other.width > right or other.y + other.height > bottom
+        return not beyond and other.x >= self.x and other.y >= self.y
+
     @property
     def place(self) -> tuple[slice, slice]:
         return slice(self.y, self.y + self.height), slice(self.x, self.x + self.width)
@@ -48,6 +54,17 @@ class Animation:
     size: tuple[int, int]
     frames: Sequence[Frame]
     plays: int
+
+    def has_alpha(self) -> bool:
+        """Whether anything of any frame is seen through; only what a frame changes is looked at."""
+        cleared = Frame(0, 0, *self.size, Fraction(0), BACKGROUND, False, b"")  # as all is at first
+        found = False
+        for number, (frame, canvas) in enumerate(zip(self.frames, self.shown(), strict=True)):
+            is_bare = cleared is not None and not frame.covers(cleared)
+            found = found or is_bare or bool(canvas[frame.place][..., 3].min() < 255)
+            is_gone = frame.disposal == BACKGROUND or (frame.disposal == PREVIOUS and not number)
+            cleared = frame if is_gone else None
+        return found
 
     def shown(self) -> Iterator[np.ndarray]:
         """What is seen of each frame in turn, (h, w, 4) uint8; the array is drawn on for the next."""
