@@ -6,6 +6,7 @@ import re
 import struct
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -39,13 +40,27 @@ def read(name: str, file: Path, max_pixels: int) -> Picture:
     # its own kind is tried first: a TGA with a text of ten letters begins as a PCX does
     with Image.open(file, formats=[own, *sorted(KINDS - {own})]) as image:
         check_size(file, *image.size, max_pixels)
+        further = _after_netpbm(image, file)
         pixels = np.asarray(image.convert(image.palette.mode) if image.mode == "P" and image.palette else image)
     if pixels.dtype == np.int32:  # Pillow's mode for 16-bit grey
         pixels = np.clip(pixels, 0, 65535).astype(np.uint16)
     if name == "JPEG 2000" and pixels.ndim == 2 and (bits := _depth(file)[1]) < (most := 8 * pixels.dtype.itemsize):
         pixels = spread(pixels >> most - bits, bits, most)  # Pillow puts zeros behind, so that white would be grey
-    losses = _LOSSES[name](file) if name in _LOSSES else []
+    losses = further + (_LOSSES[name](file) if name in _LOSSES else [])
     return Picture(plain_depth(file, pixels if pixels.ndim == 3 else pixels[..., None]), note=lost(file, losses))
+
+
+def _after_netpbm(image: Any, file: Path) -> list[str]:
+    """What follows the pixels of a binary PBM, PGM or PPM: further pictures, as a rule (pbm(5))."""
+    kind = start_of(file)[:2]
+    if image.format != "PPM" or kind not in (b"P4", b"P5", b"P6") or not image.tile:
+        return []
+    width, height = image.size
+    told = re.match(rb"P[56]" + GAP + rb"\d++" + GAP + rb"\d++" + GAP + rb"(\d{1,5})", start_of(file))
+    size = 2 if told and int(told[1]) > 255 else 1
+    row = -(-width // 8) if kind == b"P4" else width * size * (3 if kind == b"P6" else 1)
+    rest = file.stat().st_size - image.tile[0].offset - row * height
+    return [f"the {rest} bytes after its first picture are not kept"] if rest > len(b"\r\n") else []
 
 
 def _of_jpeg_2000(file: Path) -> list[str]:
