@@ -42,6 +42,10 @@ class CommandOrFile(TyperGroup):
         if os.path.exists(name) or _is_sequence(name):
             return super().resolve_command(ctx, ["edit", *args])
         if Path(name).suffix or Path(name).name != name:
+            from app.media.inputs import NO_ADDRESS, is_address
+
+            if is_address(name):
+                raise UserError(f"Cannot read {name}: {NO_ADDRESS}.")
             raise UserError(f"{name} does not exist; check the name of the picture, clip, recipe or project")
         raise UserError(f"{name} is neither a file nor a command; the commands are {', '.join(self.commands)}", 2)
 

@@ -758,6 +758,69 @@ def test_of_several_results_those_that_are_written_are_told_where_one_fails(fold
     }
 
 
+def test_a_map_that_shows_nothing_of_the_picture_is_told(folder: Path, fluidwarp: Run):
+    nothing = "looks up nothing inside of the picture"
+    for values, edges, is_told in (
+        (1e30, "transparent", True), (1e30, "black", True), (1e30, "clamp", False), (0.9, "black", False),
+        (-1.01, "black", True),
+    ):  # fmt: skip
+        write_map(folder / "m.npy", Displacement(np.full((48, 64, 2), values, np.float32) * (1, 0)))
+        ran = fluidwarp(folder, "apply", "m.npy", "cat.png", "-o", "z.png", "--edges", edges)
+        said = f"fluidwarp: m.npy {nothing}, which is empty then; perhaps --kind or --grid is another\n"
+        assert (ran.returncode, ran.stderr) == (0, said if is_told else "")
+    (folder / "b.toml").write_text('map = "m.npy"\n' + RECIPE)
+    ran = fluidwarp(folder, "render", "b.toml", "-o", "z.png")
+    assert (ran.returncode, f"m.npy {nothing}; give a map that does" in ran.stderr) == (0, True)
+    write_map(folder / "m.0001.npy", Displacement(np.zeros((48, 64, 2), np.float32)))
+    write_map(folder / "m.0002.npy", Displacement(np.full((48, 64, 2), 2, np.float32)))
+    ran = fluidwarp(folder, "apply", "m.%04d.npy", "cat.png", "-o", "z.%04d.png")
+    assert "1 of the maps m.%04d.npy look up nothing inside" in ran.stderr
+
+
+def test_a_map_that_is_too_small_is_refused_in_words_of_its_file(folder: Path, fluidwarp: Run):
+    np.save(folder / "m.npy", np.zeros((3, 4, 2), np.float32))
+    (folder / "b.toml").write_text('map = "m.npy"\n' + RECIPE)
+    for words in (
+        ("apply", "m.npy", "cat.png", "-o", "z.png"),
+        ("convert", "m.npy", "-o", "n.npy", "--invert"),
+        ("render", "b.toml", "-o", "z.png"),
+    ):
+        ran = fluidwarp(folder, *words)
+        assert ran.returncode == 1
+        said = r"Cannot use \S*m\.npy: it is 4 x 3 pixels, and a side must have at least 6; make a larger one\."
+        assert re.fullmatch(f"fluidwarp: {said}\n", ran.stderr)
+
+
+@pytest.mark.parametrize(
+    ("more", "where"),
+    [('[[viscosity]]\nkind = "picture"\npicture = "gone.png"\nscale = 1\n', "viscosity"), ('map = "gone.exr"\n', "")],
+)
+def test_of_a_file_that_is_gone_it_is_told_that_the_recipe_names_it(
+    folder: Path, fluidwarp: Run, more: str, where: str
+):
+    (folder / "b.toml").write_text(more + RECIPE if not where else RECIPE + more)
+    ran = fluidwarp(folder, "render", "b.toml", "-o", "z.png")
+    named = r"which the recipe names: there is no such file; check the name, or put it back\.\n"
+    assert re.fullmatch(rf"fluidwarp: {where}.*Cannot read \S*gone\.\w+, {named}", ran.stderr)
+
+
+def test_of_a_clip_a_still_shows_the_first_frame_also_through_a_map(folder: Path, fluidwarp: Run):
+    assert fluidwarp(folder, "render", "a.toml", "-o", "take.mkv").returncode == 0
+    write_map(folder / "m.npy", Displacement(np.zeros((48, 64, 2), np.float32)))
+    ran = fluidwarp(folder, "apply", "m.npy", "take.mkv", "-o", "z.png")
+    assert (ran.returncode, ran.stderr) == (0, "fluidwarp: take.mkv: of its frames only the first is used\n")
+    shown = read_picture(folder / "z.png").pixels
+    assert fluidwarp(folder, "apply", "m.npy", "take.mkv", "-o", "y.%d.png").returncode == 0
+    np.testing.assert_array_equal(shown, read_picture(folder / "y.0.png").pixels)
+
+
+@pytest.mark.parametrize("name", ["http://example.org/a.png", "https://example.org", "file:///a.png"])
+def test_an_address_as_the_first_word_is_told_as_that(folder: Path, fluidwarp: Run, name: str):
+    ran = fluidwarp(folder, name)
+    said = f"fluidwarp: Cannot read {name}: it is an address, and only files are read; download it first.\n"
+    assert (ran.returncode, ran.stderr) == (1, said)
+
+
 def test_a_fold_is_told(folder: Path, fluidwarp: Run):
     values = np.zeros((48, 64, 2), np.float32)
     values[:, 32:, 0] = -0.1

@@ -9,10 +9,10 @@ import numpy as np
 
 from app.errors import UserError
 from app.media.clip import Clip, frame_of
-from app.media.displacement import cropped, folds
-from app.media.maps import read_map
+from app.media.displacement import check_size, cropped, folds, is_beside
+from app.media.maps import read_map, telling_of
 from app.media.pictures import read_picture
-from app.media.project import frame_numbers
+from app.media.project import frame_numbers, named_in
 from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.model.sampling import SOURCE
@@ -44,7 +44,8 @@ class Pictures:
         if name == SOURCE:
             return self._frame(frame) if frame else self.source
         if name not in self._read:
-            picture = self._read[name] = read_picture(self.folder / name)
+            with named_in("the recipe", self.folder / name):
+                picture = self._read[name] = read_picture(self.folder / name)
             if picture.note:
                 self.notice(picture.note)
             mine, wanted = (picture.width, picture.height), (self.source.width, self.source.height)
@@ -63,7 +64,8 @@ class Pictures:
         """
         if name not in self._maps:
             size = self.source.width, self.source.height
-            given = read_map(self.folder / name, picture=size)
+            with named_in("the recipe", self.folder / name):
+                given = read_map(self.folder / name, picture=size)
             if given.forward:
                 forward = f"{name} tells where each point goes"
                 raise UserError(
@@ -75,7 +77,11 @@ class Pictures:
                     f"Cannot use {name}: {int(nowhere.sum())} of its pixels are NaN, and each needs a value; "
                     "fill them where the map was made."
                 )
-            self._maps[name] = cropped(given.fitted(*size)).values
+            with telling_of(self.folder / name):
+                check_size(given)
+                self._maps[name] = cropped(given.fitted(*size)).values
+            if is_beside(self._maps[name]):
+                self.notice(f"{name} looks up nothing inside of the picture; give a map that does")
             if folded := folds(self._maps[name]):
                 self.notice(f"{name} folds over itself in {folded} of its pixels")
         return self._maps[name]

@@ -81,6 +81,7 @@ class Clip(ABC):
         frames: about how many there are; None where that is not known.
         start: the number of the first.
         sounds: the codecs of its sound tracks.
+        layouts: how these are spread over loudspeakers, such as stereo or 5.1; of each, or of none.
         roles: what these are marked as, besides default, such as comment or forced.
         languages: of these, as far as they are named.
         late: seconds from the file's start, as a rule its sound's, to the first frame; 0 where ffmpeg does not say.
@@ -103,6 +104,7 @@ class Clip(ABC):
     frames: int | None = None
     start: int = 0
     sounds: tuple[str, ...] = ()
+    layouts: tuple[str, ...] = ()
     roles: tuple[str, ...] = ()
     languages: tuple[str, ...] = ()
     late: float = 0.0

@@ -43,6 +43,16 @@ def _strip_to_bits(pixels: np.ndarray, bits: int, noise: np.random.Generator | N
     return np.minimum(values + offset, top).astype(np.uint8 if bits == 8 else np.uint16)
 
 
+def spread(pixels: np.ndarray, bits: int, to: int) -> np.ndarray:
+    """Codes of `bits` bits in 8 or 16, which are more, black and white where they are; works in strips."""
+    kind, (top, most) = {8: np.uint8, 16: np.uint16}[to], (2**bits - 1, 2**to - 1)
+    out = np.empty(pixels.shape, kind)
+    rows = max(1, 500_000 // max(1, pixels[0].size))
+    for first in range(0, len(pixels), rows):
+        out[first : first + rows] = pixels[first : first + rows].astype(np.uint32) * np.uint32(most) // np.uint32(top)
+    return out
+
+
 def mixed(one: np.ndarray, other: np.ndarray, share: float, *, premultiplied: bool = False) -> np.ndarray:
     """One picture (h, w, c) dissolved into another of its kind: of that a `share` between 0 and 1, in linear light."""
     out = np.empty_like(one)

@@ -11,6 +11,8 @@ import numpy as np
 PixelPlaces = Literal["centres", "corners", "pixels"]
 """The places an ST map that does nothing holds in a row of W pixels, times W: .5 to W-.5, 0 to W, 0 to W-1."""
 
+LEAST = 6  # pixels along a side of a map that the solver takes
+
 
 class MapError(ValueError):
     """A map cannot be used; the reason and the mend, in words that follow the name of its file."""
@@ -66,6 +68,15 @@ def check_proportions(size: tuple[int, int], picture: tuple[int, int]) -> None:
         raise MapError(
             f"it is {columns} x {rows} and the picture {width} x {height}, and they must have the same proportions; "
             "crop the picture or make the map anew"
+        )
+
+
+def check_size(displacement: Displacement) -> None:
+    """Raise `MapError` if a map is too small to be looked up between its pixels."""
+    if min(displacement.width, displacement.height) < LEAST:
+        raise MapError(
+            f"it is {displacement.width} x {displacement.height} pixels, and a side must have at least {LEAST}; "
+            "make a larger one"
         )
 
 
@@ -133,6 +144,18 @@ def folds(values: np.ndarray) -> int:
         down, along = down[inner], along[inner]
         count += int(((1 + along[..., 0]) * (1 + down[..., 1]) <= along[..., 1] * down[..., 0]).sum())
     return count
+
+
+def is_beside(values: np.ndarray) -> bool:
+    """Whether a map, its values (h, w, 2) in longer sides and NaN where there is nothing, looks up no point inside."""
+    height, width = values.shape[:2]
+    longest = max(width, height)
+    x, y = ((np.arange(count) + 0.5) / longest for count in (width, height))
+    for rows in _strips(values):
+        across, down = x + values[rows, :, 0], y[rows, None] + values[rows, :, 1]
+        if ((across >= 0) & (across <= width / longest) & (down >= 0) & (down <= height / longest)).any():
+            return False
+    return True
 
 
 def _strips(array: np.ndarray) -> Iterator[slice]:

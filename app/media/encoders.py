@@ -15,20 +15,25 @@ from app.media.clip import USUAL, Clip, Colours, uncoded
 from app.media.files import NUMBER, is_sequence, writable
 from app.media.formats import FORMATS, check_picture_output, fits_profile
 from app.media.losses import lost, unusual_colours
-from app.media.video import NAMES
+from app.media.video import NAMES, WHITE
 from app.model.picture import Picture
 
 
-def tagged(colours: Colours) -> str:
-    """The filters that give a video the tags players go by: the frames' own overrule those given to the encoder."""
+def tagged(colours: Colours, bits: int) -> str:
+    """The filters that make limited YUV of RGB of so many bits, with the tags players go by.
+
+    The frames' own tags overrule those given to the encoder.
+    """
+    lowered = TO_WHITE if bits > 8 else ""
     matrix, tags = colours.matrix, f"color_primaries={colours.primaries}:color_trc={colours.transfer}"
     scaled = f"scale=out_color_matrix={matrix}:out_range=tv:flags=accurate_rnd+full_chroma_int+lanczos"
-    return f"{scaled},setparams=colorspace={matrix}:{tags}:range=tv"
+    return f"{lowered}{scaled},setparams=colorspace={matrix}:{tags}:range=tv"
 
 
 # palettegen counts every colour it meets: among 64 levels a channel it is 20 times faster, as good, and bounded
 SIX_BITS = "lutrgb=" + ":".join(f"{channel}='round(val*63/255)*255/63'" for channel in "rgb")
 ON_BLACK = "format=gbrap,premultiply=inplace=1,format=gbrp,"
+TO_WHITE = "lutrgb=" + ":".join(f"{channel}='val*{WHITE}/65535+0.5'" for channel in "rgb") + ","
 
 
 @dataclass(frozen=True)
@@ -44,7 +49,8 @@ class Stream:
     @property
     def on_black(self) -> str:
         """The filters for a codec without alpha."""
-        return (ON_BLACK if self.alpha else "") + tagged(self.colours)
+        # In 8 bits, as ffmpeg 9 makes white black where it multiplies 16.
+        return ON_BLACK + tagged(self.colours, 8) if self.alpha else tagged(self.colours, self.bits)
 
     def crf_or(self, usual: int) -> list[str]:
         """The constant rate factor, the usual one where no quality is asked for."""
@@ -78,7 +84,7 @@ def _h265(stream: Stream) -> list[str]:
 def _webm(stream: Stream) -> list[str]:
     quality = ["-c:v", "libvpx-vp9", "-b:v", "0", *stream.crf_or(24), "-row-mt", "1"]
     speed, kind = ["-deadline", "good", "-cpu-used", "4"], "yuva420p" if stream.alpha else "yuv420p"
-    return ["-vf", tagged(stream.colours), "-pix_fmt", kind, *quality, *speed, *SAME_AGAIN]
+    return ["-vf", tagged(stream.colours, stream.bits), "-pix_fmt", kind, *quality, *speed, *SAME_AGAIN]
 
 
 def _av1(stream: Stream) -> list[str]:
@@ -104,7 +110,7 @@ def lossless(stream: Stream) -> list[str]:
 
 def _prores(stream: Stream) -> list[str]:
     kind = ["-profile:v", "4444", "-pix_fmt", "yuva444p10le" if stream.alpha else "yuv444p10le", "-vendor", "apl0"]
-    return ["-vf", tagged(stream.colours), "-c:v", "prores_ks", *kind]
+    return ["-vf", tagged(stream.colours, stream.bits), "-c:v", "prores_ks", *kind]
 
 
 def _prores_422_hq(stream: Stream) -> list[str]:
@@ -130,8 +136,9 @@ class Container:
     """A kind of animation file: its options by codec, whether sides must be even, the sound, how often frames are read.
 
     The first codec is what it gets where none is asked for. `sound` names the codecs taken over as they are; any other
-    is turned into the first one, by the options `encoder`, in pairs. `roles` is what sound can be marked as,
-    `languages` what it calls each of those that it knows; None: it knows all, as ISO 639-2 calls them.
+    is turned into the first one, by the options `encoder`, in pairs, for the `layouts` of loudspeakers that it has;
+    None: all. `roles` is what sound can be marked as, `languages` what it calls each of those that it knows; None: it
+    knows all, as ISO 639-2 calls them.
     """
 
     name: str
@@ -139,6 +146,7 @@ class Container:
     even: bool = False
     sound: tuple[str, ...] = ()
     encoder: tuple[str, ...] = ()
+    layouts: tuple[str, ...] | None = None
     roles: tuple[str, ...] = ()
     languages: Mapping[str, str] | None = None
     passes: int = 1
@@ -171,6 +179,10 @@ MAC_NAMES = {name: name for name in MAC_LANGUAGES.split()} | {
     "rum": "ron", "slo": "slk", "sqi": "alb", "swe": "sve", "zho": "chi",
 }  # fmt: skip
 
+# What Opus and FLAC hold (RFC 7845, 5.1.1.2; RFC 9639, 9.1.3): of another ffmpeg makes the nearest for Opus, and names
+# it wrongly in FLAC. The 5.1(side) of AC-3 is 5.1 in the words of ffmpeg.
+LAYOUTS = ("mono", "stereo", "3.0", "quad", "5.0", "5.1", "6.1", "7.1")
+
 ANIMATIONS = {
     ".mp4": Container(
         "MP4",
@@ -185,7 +197,8 @@ ANIMATIONS = {
         {"vp9": _webm, "av1": _av1},
         even=True,
         sound=("opus", "vorbis"),
-        encoder=("-c", "libopus", "-b", "128k"),
+        encoder=("-c", "libopus", "-b", "128k", "-filter", f"aformat=channel_layouts={'|'.join(LAYOUTS)}"),
+        layouts=LAYOUTS,
         roles=("forced",),
     ),
     ".mkv": Container(
@@ -193,6 +206,7 @@ ANIMATIONS = {
         {"ffv1": lossless},
         sound=("flac", "aac", "mp3", "ac3", "opus", "vorbis"),
         encoder=("-c", "flac"),
+        layouts=LAYOUTS,
         roles=(*ROLES, "original"),
     ),
     ".mov": Container(
@@ -271,10 +285,14 @@ def unheld_of_clip(
     else:
         other = dict.fromkeys(sound for sound in clip.sounds if sound not in (*container.sound, "none"))
         losses = [f"its sound ({' '.join(other)}) becomes {container.sound[0]}"] if other else []
+        turned = [layout for sound, layout in zip(clip.sounds, clip.layouts, strict=False) if sound in other]
+        known = container.layouts
+        if known and (moved := [layout for layout in turned if layout.removesuffix("(side)") not in (*known, "")]):
+            losses.append(f"the loudspeakers of its sound ({', '.join(dict.fromkeys(moved))}) become others")
         if dropped := [role for role in clip.roles if role not in container.roles]:
             losses.append(f"what its sound is marked as ({', '.join(dropped)}) is not kept")
-        known = container.languages
-        if unknown := [language for language in clip.languages if known is not None and language not in known]:
+        spoken = container.languages
+        if unknown := [language for language in clip.languages if spoken is not None and language not in spoken]:
             losses.append(f"what its sound is spoken in ({', '.join(unknown)}) is not kept")
         if container.even and size is not None and (size[0] % 2 or size[1] % 2):
             losses.append(f"its last pixels are repeated, as {container.name} has no odd sides")

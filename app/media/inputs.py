@@ -30,6 +30,9 @@ SIZE = 2  # place of a file's bytes in its `state_of`
 MOST_INDEX = 16 * 2**20  # bytes of an archive's list of members
 
 
+NO_ADDRESS = "it is an address, and only files are read; download it first"
+
+
 def open_input(path: str | os.PathLike[str], kind: str = "file", most: int | None = None) -> BinaryIO:
     """Open an ordinary file of no more than `most` bytes for reading: never a pipe or a device, which might not end.
 
@@ -50,11 +53,16 @@ def open_input(path: str | os.PathLike[str], kind: str = "file", most: int | Non
         raise cannot_read(path, error) from None
 
 
+def is_address(name: str) -> bool:
+    """Whether what is no file is an address of the web; a path leaves one slash of the two."""
+    return re.match("[a-zA-Z]{2,}:/", name) is not None
+
+
 def cannot_read(path: str | os.PathLike[str], error: OSError) -> UserError:
     """What `error` means for the user who wanted `path` read."""
     reason = MENDS.get(error.errno or 0, f"{error.strerror or error or 'the system gave no reason'}; try a copy of it")
-    if error.errno == errno.ENOENT and re.match("[a-zA-Z]{2,}:/", str(path)):  # of a path, only one slash is left
-        reason = "it is an address, and only files are read; download it first"
+    if error.errno == errno.ENOENT and is_address(str(path)):
+        reason = NO_ADDRESS
     return UserError(f"Cannot read {path}: {reason}.")
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
-from itertools import accumulate
+from itertools import accumulate, islice
 from math import gcd, lcm
 from pathlib import Path
 from typing import Any
@@ -16,8 +16,9 @@ import numpy as np
 
 from app.errors import Cancelled, UserError
 from app.media.clip import DEEP, SHALLOW, WHOLE, FileClip, FrameRange, has_changed
-from app.media.codecs import pillow, tiff
+from app.media.codecs import apng, gif, pillow, tiff
 from app.media.codecs.decoding import decoding, head_of
+from app.media.codecs.layered import Animation
 from app.media.formats import kind_of
 from app.media.inputs import MAX_PIXELS, SIZE, open_input, state_of
 from app.media.losses import lost
@@ -71,14 +72,18 @@ class Pages(FileClip):
         """See `Clip`."""
         first, last = part
         with decoding(self.path, self.kind):
+            self._check_unchanged()
+            layered = _layered(self.kind, self.path)
+            shown = islice(layered.shown(), first, None) if layered else None
             for number in range(first, min(len(self.places) if last is None else last + 1, len(self.places))):
                 if cancel():
                     raise Cancelled
+                canvas = next(shown) if shown else None  # also of one that is kept: the next lies on it
                 if is_kept(number):
                     continue
                 self._check_unchanged()
                 try:
-                    picture = self._page(self.places[number])
+                    picture = self._page(self.places[number]) if canvas is None else self._of(canvas)
                 except Exception:
                     self._check_unchanged()  # in the meantime
                     raise
@@ -96,6 +101,9 @@ class Pages(FileClip):
             state = state_of(stream.fileno())
         if self.state and state and state != self.state:
             raise has_changed(self.path, self.state[SIZE], state[SIZE])
+
+    def _of(self, canvas: np.ndarray) -> Picture:
+        return Picture((canvas if self.alpha else canvas[..., :3]).copy())
 
     def _page(self, place: int) -> Picture:
         if self.kind == "TIFF":
@@ -144,20 +152,42 @@ def read_pages(path: Path, first: Picture, max_pixels: int = MAX_PIXELS) -> Page
 
 def _animation(name: str, path: Path, max_pixels: int) -> tuple[list[int], list[Fraction], bool, int]:
     """The places and durations, in seconds, of an animation's frames, whether any has alpha, and how often it plays."""
+    if name == "PNG":
+        with pillow.opened(name, path, max_pixels):  # which is not too large
+            found = _layered(name, path)
+        if found is None:
+            return [], [], False, 0
+        durations = [_shown_for(one.seconds * 1000) for one in found.frames]
+        return list(range(len(durations))), durations, found.has_alpha(), found.plays
     with pillow.opened(name, path, max_pixels) as image:
         if not getattr(image, "is_animated", False):
             return [], [], False, 0
-        places = list(range(int(getattr(image, "default_image", False)), image.n_frames))  # a PNG for other readers
+        places = list(range(image.n_frames))
         durations, alpha = [], False
         for place in places:
             image.seek(place)
             image.load()
-            durations.append(Fraction(image.info.get("duration") or UNTOLD).limit_denominator(1000) / 1000)
+            durations.append(_shown_for(Fraction(image.info.get("duration") or 0)))
             alpha = alpha or (image.has_transparency_data and _pixels(image, True)[..., 3].min() < 255)
+        alpha = alpha or _layered(name, path) is not None
         loops = image.info.get("loop")
         # a GIF tells how often it begins again, or nothing if it does not
         plays = loops or 0 if name != "GIF" else 1 if loops is None else loops + 1 if loops else 0
         return places, durations, bool(alpha), plays
+
+
+def _layered(name: str, path: Path) -> Animation | None:
+    """The frames that Pillow does not lay over one another as they should be."""
+    read = {"PNG": apng.read, "GIF": gif.read}.get(name)
+    if read is None:
+        return None
+    with open_input(path, "clip") as stream:
+        return read(stream.read())
+
+
+def _shown_for(milliseconds: Fraction) -> Fraction:
+    """The seconds that a frame is shown."""
+    return (milliseconds or Fraction(UNTOLD)).limit_denominator(1000) / 1000
 
 
 def _pixels(image: Any, alpha: bool) -> np.ndarray:

@@ -26,7 +26,7 @@ def read_picture(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> 
     kind = kind_of(file, head_of(file))
     if kind is None:
         known = ", ".join(kind.name for kind in TABLE)
-        raise UserError(f"Cannot read {file}: it is not a picture of a known kind ({known}).")
+        raise UserError(f"Cannot read {file}: it is not a picture of a known kind ({known}); convert it to one.")
     with decoding(file, kind.name):
         return kind.read(file, max_pixels)
 

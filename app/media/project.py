@@ -114,7 +114,7 @@ def from_recipe(path: str | os.PathLike[str]) -> Project:
 
 @contextmanager
 def named_in(path: str | os.PathLike[str], file: Path) -> Iterator[None]:
-    """Let a `UserError` of the block about the picture's `file` also tell which recipe or project names it."""
+    """Let a `UserError` of the block about a picture's or map's `file` also tell which recipe or project names it."""
     try:
         yield
     except UserError as error:

@@ -21,6 +21,9 @@ from app.media.losses import lost, not_kept
 from app.model.picture import Picture
 from app.progress import never
 
+# swscale takes 16 bits of RGB for 8 with bits behind: what it makes of the white of limited YUV, and takes for it.
+WHITE = 65283
+
 SEEKABLE = (".mp4", ".m4v", ".mov", ".mkv", ".webm", ".avi")
 
 # What ffmpeg calls colours that are BT.709 or sRGB, or nearly; and the others' usual names.
@@ -163,6 +166,9 @@ def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Vid
     alpha = hidden or bool(re.match(r"(yuva|gbrap|rgba|bgra|argb|abgr|ya\d|pal8)", pixel_format))
     matrix = "" if re.search(r"bt709|bt2020|smpte170m|bt470bg|gbr", video) else _untagged(video)
     filters = f"scale={'iw*sar' if _wide(video) else 'iw'}:ih{matrix}:flags=accurate_rnd+full_chroma_int,setsar=1"
+    deep = re.search(r"(9|10|12|14|16|48|64)(le|be)$", pixel_format) is not None
+    if deep:
+        filters += _to_white(pixel_format, is_full=re.search(rf"{pixel_format}\(pc", video) is not None, alpha=alpha)
     late = _late(told, video)
     if late:  # or the first frame would be shown from the sound's start on
         filters = _delayed(late) + filters
@@ -178,10 +184,11 @@ def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Vid
         fps=fps,
         frames=max(1, round((seconds - late) * fps)) if seconds is not None else None,
         sounds=tuple(track.codec for track in sounds),
+        layouts=tuple(track.layout for track in sounds),
         roles=tuple(dict.fromkeys(role for track in sounds for role in track.roles)),
         languages=tuple(dict.fromkeys(track.language for track in sounds if track.language)),
         late=late,
-        bits=16 if re.search(r"(9|10|12|14|16|48|64)(le|be)$", pixel_format) else 8,
+        bits=16 if deep else 8,
         pixel_format=pixel_format,
         alpha=alpha,
         decoder=("-c:v", "libvpx-vp9") if hidden else (),
@@ -200,6 +207,20 @@ def _wide(video: str) -> str:
     """The width and height of a pixel, as 4:3, by ffmpeg's words about a stream; "" of square ones."""
     aspect = re.search(r"SAR (\d+):(\d+)", video)
     return "" if aspect is None or aspect[1] == aspect[2] else f"{aspect[1]}:{aspect[2]}"
+
+
+def _to_white(pixel_format: str, is_full: bool, alpha: bool) -> str:
+    """The filter that puts the white of more than 8 bits, and what is opaque, where 16 bits of RGB have it.
+
+    Of limited YUV swscale makes a white of `WHITE`, of full YUV, grey and alpha the code with zeros behind.
+    """
+    if re.match(r"(gbr|rgb|bgr|argb|abgr|x2|0rgb|xyz)", pixel_format):
+        return ""
+    bits = int(found[1]) if (found := re.search(r"(9|10|12|14|16)(?:le|be)$", pixel_format)) else 16
+    shifted = (2**bits - 1) << (16 - bits)
+    white = shifted if is_full or pixel_format.startswith(("gray", "ya")) else WHITE
+    lifts = [f"{channel}='val*65535/{white}+0.5'" for channel in "rgb"] + [f"a='val*65535/{shifted}+0.5'"] * alpha
+    return f",format={'rgba64le' if alpha else 'rgb48le'},lutrgb={':'.join(lifts)}"
 
 
 def _delayed(late: float) -> str:
@@ -297,12 +318,14 @@ class SoundTrack:
         name: what an MP4 or MOV calls it; ffmpeg takes it over as a title from other containers only.
         roles: what it is for, such as comment or forced, besides default.
         language: three letters of ISO 639-2; "" if it does not say.
+        layout: of its channels, as 5.1(side); "" if there is none.
     """
 
     codec: str
     name: str
     roles: tuple[str, ...]
     language: str
+    layout: str = ""
 
 
 def sound_tracks(path: str | os.PathLike[str]) -> list[SoundTrack]:
@@ -320,7 +343,16 @@ def _sounds(told: str) -> list[SoundTrack]:
             codec, name = re.match(r"\w+", words), re.search(r"^ +name +: (.*?) *$", lines, re.MULTILINE)
             roles = [role for role in re.findall(r" \(([a-z ]+)\)", words) if role != "default"]
             spoken = "" if language == "und" else language
-            tracks.append(SoundTrack(codec[0] if codec else "none", name[1] if name else "", tuple(roles), spoken))
+            layout = re.search(r" Hz, ([^, ]+)", words)
+            tracks.append(
+                SoundTrack(
+                    codec[0] if codec else "none",
+                    name[1] if name else "",
+                    tuple(roles),
+                    spoken,
+                    layout[1] if layout else "",
+                )
+            )
     return tracks
 
 

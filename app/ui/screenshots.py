@@ -1,8 +1,8 @@
-"""The pictures of the window in the README: `python -m app.ui.screenshots FOLDER`, made without a window."""
+"""The pictures of the window in the README: `python -m app.ui.screenshots [FOLDER]`, made without a window."""
 
 from __future__ import annotations
 
-import sys
+import argparse
 from collections.abc import Callable
 from dataclasses import replace
 from importlib import resources
@@ -192,4 +192,6 @@ def main(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "assets/screenshots"))
+    words = argparse.ArgumentParser(description=__doc__)
+    words.add_argument("folder", nargs="?", type=Path, default=Path("assets/screenshots"), help="default: %(default)s")
+    main(words.parse_args().folder)

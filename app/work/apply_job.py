@@ -122,11 +122,11 @@ class Application(Piece):
         if source.clip is not None:
             check_colours(self._output, self.outputs.codec, source.clip, self.outputs.is_animation)
         check_colours_of_picture(self._output, self.outputs.codec, source.picture, self.outputs.is_animation)
-        if self.outputs.is_animation != (self.maps.is_sequence or source.clip is not None):
-            what = "a still" if not self.outputs.is_animation else "an animation"
-            mend = "write f.%04d.png or .mp4" if not self.outputs.is_animation else "write a picture, such as out.png"
-            given = "several maps or a clip" if not self.outputs.is_animation else "one map and one picture"
-            raise UserError(f"Cannot write {self._output}: {given} do not make {what}; {mend}.")
+        if self.outputs.is_animation and not self.maps.is_sequence and source.clip is None:
+            why = "one map and one picture do not make an animation; write a picture, such as out.png"
+            raise UserError(f"Cannot write {self._output}: {why}.")
+        if self.maps.is_sequence and not self.outputs.is_animation:
+            raise UserError(f"Cannot write {self._output}: several maps do not make a still; write f.%04d.png or .mp4.")
         with MapSampler(device(), self.edges, self.filter, source.picture.premultiplied) as sampler:
             work = _Applying(self, source, sampler, progress)
             count = work.write_frames() if self.outputs.is_animation else work.write_still()

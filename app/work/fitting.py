@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import islice
 from math import inf, sqrt
 from pathlib import Path
 from typing import Any
@@ -18,12 +17,12 @@ from app.errors import Cancelled, UserError
 from app.media.auxiliary import Pictures
 from app.media.clip import Clip
 from app.media.landmarks import Pairs
+from app.media.losses import few
 from app.model.handles import (
     ARRIVED,
     LARGEST_LEAD,
     LEAST_SCALE,
     MOST_HANDLES,
-    MOST_OBJECTIONS,
     MOST_SCALE,
     MOST_TURNED,
     RecipeHandle,
@@ -521,7 +520,9 @@ class _Search:
             return np.array([-found.excess / ARRIVED, (found.det - LEAST_DET) / LEAST_DET])
 
         groups = groups * self.is_free[:, None]
-        groups = groups[:, groups.any(axis=0)]
+        # What has no room on either side does not move: one at 0 and one at 1 that change alike.
+        moves = [group.any() and origin[group > 0].min() > origin[group > 0].max() - 1 for group in groups.T]
+        groups = groups[:, moves]
         if not groups.size:
             return
         inside = [origin[group > 0] for group in groups.T]
@@ -551,10 +552,16 @@ class _Search:
             self.notices.append("the picture folds even so: the recipe itself folds it")
         errors = trial.errors * self.longer
         missed = [number for number in self.numbers if not trial.errors[number] <= ARRIVED]
-        for number in missed:
-            self.notices.append(f"{self._label(number)} ends {errors[number]:.3g} pixels from where it should be")
-        said = objections(trial.recipe.handle, trial.recipe.pin, (self.extent[0], self.extent[1]))
-        self.notices += list(islice(said, MOST_OBJECTIONS))
+        most = max((errors[number] for number in missed), default=0.0)
+        self._note(
+            missed,
+            f"ends {most:.3g} pixels from where it should be",
+            f"end up to {most:.3g} pixels from where they should be",
+        )
+        said = list(objections(trial.recipe.handle, trial.recipe.pin, (self.extent[0], self.extent[1])))
+        self.notices += (
+            [said[0] + (f"; there are {len(said) - 1} more conflicts" if len(said) > 1 else "")] if said else []
+        )
         arrived = np.stack([self.pairs[:, 0], trial.arrived], axis=1)[self.numbers]
         pairs = Pairs(arrived, tuple(self.aim.pairs.curves[number] for number in self.numbers))
         is_met = not (missed or trial.folds) and len(self.numbers) == len(self.pairs)
@@ -631,16 +638,29 @@ class _Search:
         curve = self.aim.pairs.curves[number]
         return self.aim.names[number] + (f' of the curve "{curve[:40]}"' if curve else "")
 
+    def _note(self, numbers: Sequence[int], of_one: str, of_more: str) -> None:
+        """Note what is to be said of some pairs, in one sentence."""
+        if len(numbers):
+            named = few([self._label(number) for number in numbers])
+            self.notices.append(f"{named} {of_one if len(numbers) == 1 else of_more}")
+
     def _usable(self, base: Recipe) -> np.ndarray:
         """The numbers of the pairs that get a handle; of the others it is noted why not."""
         inside = np.abs(self.pairs - 0.5).max(axis=2) <= 0.5
         # The middle of a line may be in the picture and none of its corners.
         inside[:, 0] &= [lead.handle.takes_hold for lead in self.aim.leads]
-        for number, (here, there) in enumerate(inside):
-            if not here:
-                self.notices.append(f"{self._label(number)} is left out: its point is outside the picture")
-            elif not there:
-                self.notices.append(f"{self._label(number)} goes only to the picture's edge: its place is outside it")
+        (here, there), edge = inside.T, "the picture's edge"
+        out, short = np.flatnonzero(~here), np.flatnonzero(here & ~there)
+        self._note(
+            out.tolist(),
+            "is left out: its point is outside the picture",
+            "are left out: their points are outside the picture",
+        )
+        self._note(
+            short.tolist(),
+            f"goes only to {edge}: its place is outside it",
+            f"go only to {edge}: their places are outside",
+        )
         numbers, taken = np.flatnonzero(inside[:, 0]), len(base.handle) + len(base.pin) - len(self.aim.own)
         if not len(numbers):
             if self.aim.own:
@@ -669,19 +689,21 @@ class _Search:
         one = np.concatenate([cells[:, :-1][across], cells[:-1][down]])
         other = np.concatenate([cells[:, 1:][across], cells[1:][down]])
         part = connected_components(cells.ravel(), one, other).reshape(ny, nx)
-        hopeful = []
+        hopeful, caught = [], {"point": [], "place": [], "": list[int]()}
         for number in self.numbers:
             ends = np.minimum(np.clip(self.pairs[number], 0, 1) * (nx, ny), np.array([nx, ny]) - 1).astype(int)
             (x0, y0), (x1, y1) = ends.tolist()
             frozen = [name for name, (x, y) in (("point", ends[0]), ("place", ends[1])) if solid[y, x]]
             if frozen:
-                self.notices.append(f"{self._label(number)} cannot be met: its {frozen[0]} is frozen")
+                caught[frozen[0]].append(number)
             elif part[y0, x0] != part[y1, x1]:
-                self.notices.append(
-                    f"{self._label(number)} cannot be met: what is frozen lies between its point and its place"
-                )
+                caught[""].append(number)
             else:
                 hopeful.append(number)
+        for end in ("point", "place"):
+            self._note(caught[end], f"cannot be met: its {end} is frozen", f"cannot be met: their {end}s are frozen")
+        between = "cannot be met: what is frozen lies between"
+        self._note(caught[""], f"{between} its point and its place", f"{between} their points and their places")
         return np.array(hopeful, int)
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from app.media.displacement import Displacement, MapError, cropped, folds
+from app.media.displacement import Displacement, MapError, check_size, cropped, folds, is_beside
 from app.media.files import is_sequence
 from app.work.export import Target, looked_up, opaque_value, with_alpha
 from app.work.layers import widened
@@ -40,6 +40,7 @@ class MapSampler:
         self._outside: np.ndarray | None = None
         self._wide: tuple[Displacement, tuple[int, int, int, int], Displacement] | None = None
         self._folds: list[int] = []  # of the maps that fold over themselves, in how many pixels each
+        self._beside = 0  # how many maps show nothing of the picture
 
     def __enter__(self) -> MapSampler:
         return self
@@ -61,12 +62,15 @@ class MapSampler:
         return found if self._outside is None else emptied(found, self._outside, target.how.edges, target.alpha)
 
     def _take(self, given: Displacement, pixels: np.ndarray) -> None:
+        check_size(given)
         if self._map is not None:
             self._map.release()
         inverse = inverted(self._device, given) if given.forward else given
         values = cropped(inverse.fitted(pixels.shape[1], pixels.shape[0])).values
         if folded := folds(values):
             self._folds.append(folded)
+        if self.how.edges in ("transparent", "black"):
+            self._beside += is_beside(values)
         outside = np.asarray(np.isnan(values).any(axis=2))
         self._outside = outside if outside.any() else None
         self._map, self._given = GivenMap(self._device, filled(values, outside)), given
@@ -79,13 +83,20 @@ class MapSampler:
 
     def notices(self, path: Path) -> list[str]:
         """What the user should hear of the maps of `path`."""
+        said = []
+        if self._beside:
+            named = f"{self._beside} of the maps {path.name} look" if is_sequence(path) else f"{path.name} looks"
+            said = [
+                f"{named} up nothing inside of the picture, which is empty then; perhaps --kind or --grid is another"
+            ]
         if not self._folds:
-            return []
+            return said
         if is_sequence(path):
             return [
-                f"folds in {len(self._folds)} of the maps {path.name}, the worst in {max(self._folds)} of its pixels"
+                *said,
+                f"folds in {len(self._folds)} of the maps {path.name}, the worst in {max(self._folds)} of its pixels",
             ]
-        return [f"{path.name} folds over itself in {self._folds[0]} of its pixels"]
+        return [*said, f"{path.name} folds over itself in {self._folds[0]} of its pixels"]
 
 
 def inverted(device: Device, given: Displacement) -> Displacement:
@@ -94,6 +105,7 @@ def inverted(device: Device, given: Displacement) -> Displacement:
     Raises:
         MapError: if the map has holes, or is too small, too narrow or too large to be looked up.
     """
+    check_size(given)
     values = cropped(given).values
     if np.isnan(values).any():
         raise MapError("it is NaN in places, and cannot be inverted; fill it first")

@@ -441,7 +441,7 @@ class Replay:
         try:
             self.warp.set(self.pictures.load_map(name))
         except ValueError as error:
-            raise UserError(f"{name} cannot be the map to begin with: {error}") from None
+            raise UserError(f"{name} cannot be the map to begin with: {error}; make it anew") from None
 
     def _new_density(self) -> Density:
         values, settings = self._density_values(), self.recipe.density

@@ -710,7 +710,7 @@ def tagged(path: Path, setting: str, *options: str) -> str:
 def test_what_of_a_clip_is_not_understood_is_told(tmp_path: Path):
     ten, hdr = "format=yuv420p10le", "setparams=colorspace=bt2020nc:color_primaries=bt2020:color_trc="
     assert tagged(tmp_path / "a.mp4", "format=yuv420p") == ""
-    assert tagged(tmp_path / "a.mp4", f"format=yuv420p,{encoders.tagged(USUAL)}") == ""
+    assert tagged(tmp_path / "a.mp4", f"format=yuv420p,{encoders.tagged(USUAL, 8)}") == ""
     assert (
         tagged(tmp_path / "a.mkv", "format=gbrp,setparams=color_primaries=bt709:color_trc=iec61966-2-1", "-c:v", "ffv1")
         == ""
@@ -733,6 +733,62 @@ def test_what_of_a_clip_is_not_understood_is_told(tmp_path: Path):
     assert said == "a.mp4: it is interlaced, and its fields are treated as whole frames"
     said = tagged(tmp_path / "a.mov", "format=yuv422p10,setfield=bff", "-flags", "+ildct+ilme", "-c:v", "prores_ks")
     assert "interlaced" in said
+
+
+@pytest.mark.parametrize("is_full", [False, True])
+@pytest.mark.parametrize("kind", ["yuv444p10le", "yuva444p12le", "gray10le", "gbrp10le", "yuv444p"])
+def test_black_grey_and_white_of_a_clip_are_as_the_standard_says(tmp_path: Path, kind: str, is_full: bool):
+    """By BT.2100, table 9, in float64: swscale's white of 16 bits is .4 % darker, and its opaque is not opaque."""
+    bits, planes = (10 if "10" in kind else 12 if "12" in kind else 8), 1 if kind.startswith("gray") else 3
+    limited, dtype = kind.startswith("yuv") and not is_full, np.uint8 if kind == "yuv444p" else np.uint16
+    top, step = 2**bits - 1, 2 ** (bits - 8)
+    black, white = (16 * step, 235 * step) if limited else (0, top)
+    codes = np.linspace(black, white, 48).round().astype(dtype)
+    frame = np.empty((4 if "a" in kind[:4] and planes == 3 else planes, 48, 64), dtype)
+    frame[:] = codes[:, None] if not kind.startswith("yuv") else 128 * step
+    frame[0] = codes[:, None]
+    if len(frame) == 4:
+        frame[3] = np.linspace(0, top, 64).round()
+    tags = ["-color_range", "pc" if is_full else "tv", *(["-colorspace", "bt709"] if kind.startswith("yuv") else [])]
+    how = ["-f", "rawvideo", "-pix_fmt", kind, "-s", "64x48", "-r", "5", *tags, "-i", "-"]
+    clip = tmp_path / "a.mkv"
+    command = [ffmpeg.executable(), "-v", "error", *how, "-c:v", "ffv1", *tags, str(clip)]
+    subprocess.run(command, input=frame.tobytes(), check=True)
+    (seen,) = read_clip(clip).read_frames()
+    most = np.iinfo(seen.dtype).max
+    wanted = np.broadcast_to(((codes.astype(float) - black) / (white - black) * most)[:, None], (48, 64))
+    assert np.abs(seen[..., :3] - wanted[..., None]).max() < (1 if bits == 8 else 4)
+    if len(frame) == 4:
+        assert np.abs(seen[..., 3] - np.linspace(0, top, 64).round() / top * most).max() < 1
+
+
+@pytest.mark.parametrize(
+    ("ending", "codec", "kind", "white"),
+    [
+        (".mp4", None, "yuv420p", 235),
+        (".mp4", "h265", "yuv420p10le", 940),
+        (".mov", None, "yuva444p12le", 3760),
+        (".mov", "prores-422-hq", "yuv422p10le", 940),
+        (".webm", None, "yuv420p", 235),
+        (".webm", "av1", "yuv420p10le", 940),
+        (".mkv", None, "gbrp16le", 65535),
+    ],
+)
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+def test_white_is_written_as_the_standard_says(
+    tmp_path: Path, ending: str, codec: str | None, kind: str, white: int, dtype: type
+):
+    if ending == ".mkv" and dtype is np.uint8:
+        pytest.skip("which is written in 8 bits of RGB")
+    channels = 4 if kind.startswith("yuva") else 3
+    with animation_writer(tmp_path / f"a{ending}", 5, AnimationOptions(codec=codec, quality=100)) as write:
+        write(np.full((48, 64, channels), np.iinfo(dtype).max, dtype))
+    command = [ffmpeg.executable(), "-v", "error", "-i", str(tmp_path / f"a{ending}"), "-f", "rawvideo"]
+    done = subprocess.run([*command, "-pix_fmt", kind, "-"], capture_output=True, check=True)
+    codes = np.frombuffer(done.stdout, np.uint8 if kind.endswith("p") else "<u2")
+    assert set(codes[: 48 * 64].tolist()) == {white}
+    if channels == 4:
+        assert set(codes[-48 * 64 :].tolist()) == {4095}
 
 
 def test_further_tracks_of_a_clip_are_told(tmp_path: Path):
@@ -804,6 +860,17 @@ def test_a_sound_track_keeps_its_language_or_that_is_told(tmp_path: Path) -> Non
         assert ("what its sound is spoken in (nob) is not kept" in told) == (ending == ".mov")
 
 
+def test_sound_of_a_cinema_goes_into_any_container(tmp_path: Path) -> None:
+    """AC-3, which films have, calls the loudspeakers behind side ones, and libopus knows none."""
+    noise = ["-f", "lavfi", "-i", "anoisesrc=d=0.3,aformat=channel_layouts=5.1(side)", "-c:a", "eac3"]
+    clip = generate(tmp_path / "in.mkv", "testsrc=s=64x48:r=10:d=0.3", *noise)
+    assert read_clip(clip).layouts == ("5.1(side)",)
+    for ending in (".webm", ".mkv", ".mp4", ".mov"):
+        save(tmp_path / f"a{ending}", 3, 10, sound=clip, frames=3)
+        assert probe(tmp_path / f"a{ending}")[1]["channels"] == 6
+        assert "loudspeakers" not in unheld_of_clip(f"a{ending}", None, replace(read_clip(clip), bits=8))
+
+
 def test_what_else_a_clip_holds_is_told(tmp_path: Path):
     told = tmp_path / "told.txt"
     told.write_text(";FFMETADATA1\ntitle=A day\nartist=Me\n[CHAPTER]\nTIMEBASE=1/1\nSTART=0\nEND=1\ntitle=Morning\n")
@@ -862,6 +929,12 @@ def test_sound_and_times_that_a_format_has_no_room_for_are_told(tmp_path: Path):
     marked = replace(clip, sounds=("aac",), roles=("dub", "forced"))
     assert unheld_of_clip("a.mp4", None, marked) == unheld_of_clip("a.mkv", None, marked) == ""
     assert unheld_of_clip("a.mov", None, marked) == "a.mov: what its sound is marked as (dub, forced) is not kept"
+    for layouts, moved in ((("stereo", "5.1(side)", ""), ""), (("2.1", "4.0", ""), "4.0"), (("", "2.1", "7.0"), "2.1")):
+        spread = replace(clip, layouts=layouts)
+        said = f"; the loudspeakers of its sound ({moved}) become others" if moved else ""
+        assert unheld_of_clip("a.mkv", None, spread) == f"a.mov: its sound (pcm_s24le) becomes flac{said}"
+        assert unheld_of_clip("a.mov", None, spread) == ""
+    assert "its sound (2.1, 4.0) become" in unheld_of_clip("a.webm", None, replace(clip, layouts=("2.1", "4.0", "")))
     assert "becomes opus; what its sound is marked as (dub) is not kept" in unheld_of_clip("a.webm", None, marked)
     assert unheld_of_clip("a.mov", None, clip, (63, 48)) == (
         "a.mov: its last pixels are repeated, as ProRes has no odd sides"

@@ -14,6 +14,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import cv2
+import imagecodecs
 import numpy as np
 import OpenEXR
 import pytest
@@ -471,6 +472,7 @@ def test_every_chunk_of_a_png_is_kept_or_told(tmp_path: Path):
     wide = struct.pack(">IIB", 2, 1, 0)  # no unit: only the shape of a pixel
     assert with_chunks(path, pHYs=wide) == "a.png: the shape of its pixels (2:1) is not kept"
     assert with_chunks(path, pHYs=struct.pack(">IIB", 1, 1, 0)) == ""
+    assert with_chunks(path, pHYs=struct.pack(">IIB", 0, 1, 0)) == ""  # as ffmpeg writes what it does not know
 
 
 def test_exif_in_a_text_of_a_png_is_written_once_and_upright(tmp_path: Path):
@@ -646,6 +648,55 @@ def test_the_colours_of_an_avif_are_told(tmp_path: Path):
     assert read_picture(tmp_path / "b.avif").note == ""
 
 
+@pytest.mark.parametrize(("density", "exif", "said"), [
+    ((0, 2, 1), {}, "a.jpg: the shape of its pixels (1:2) is not kept"),
+    ((0, 1, 1), {}, ""),
+    ((0, 0, 1), {}, ""),
+    ((1, 72, 36), {}, ""),
+    ((0, 2, 1), {282: 300.0, 283: 150.0, 296: 2}, ""),
+])  # fmt: skip
+def test_a_jpeg_of_pixels_that_are_not_square_is_told(
+    tmp_path: Path, density: tuple[int, ...], exif: dict[int, float], said: str
+):
+    tags, buffer = Image.Exif(), io.BytesIO()
+    tags.update(exif)
+    Image.fromarray(smooth(3)).save(buffer, "JPEG", exif=tags.tobytes())
+    data = buffer.getvalue()
+    at = data.index(b"JFIF\0") + 7
+    (tmp_path / "a.jpg").write_bytes(data[:at] + struct.pack(">BHH", *density) + data[at + 5 :])
+    read = read_picture(tmp_path / "a.jpg")
+    assert (read.note, read.dpi) == (said, (300, 150) if exif else (72, 36) if density[0] else None)
+
+
+@pytest.mark.parametrize(
+    ("name", "one"),
+    [
+        ("a.ppm", b"P6 9 8 255\n" + bytes(216)),
+        ("a.pgm", b"P5 9 8 255\n" + bytes(72)),
+        ("a.pgm", b"P5\n# 1\n9 8\n65535\n" + bytes(144)),
+        ("a.pgm", b"P5 9 8 100\n" + bytes(72)),
+        ("a.pbm", b"P4 9 8\n" + bytes(16)),
+    ],
+)
+def test_further_pictures_of_a_netpbm_file_are_told(tmp_path: Path, name: str, one: bytes):
+    for data, said in ((one, ""), (one + b"\n", ""), (one + one, f"{name}: the {len(one)} bytes after its first")):
+        (tmp_path / name).write_bytes(data)
+        told = read_picture(tmp_path / name)
+        assert told.note.startswith(said)
+        assert bool(told.note) == bool(said)
+        assert (told.width, told.height) == (9, 8)
+
+
+@pytest.mark.parametrize("bits", [1, 4, 10, 12])
+def test_a_grey_jpeg_2000_is_white_where_it_is(tmp_path: Path, bits: int):
+    kind = np.uint8 if bits <= 8 else np.uint16
+    codes = np.random.default_rng(bits).integers(0, 2**bits, (8, 16), kind)
+    (tmp_path / "a.jp2").write_bytes(imagecodecs.jpeg2k_encode(codes, level=0, reversible=True, bitspersample=bits))
+    read = read_picture(tmp_path / "a.jp2")
+    assert (read.pixels.dtype, read.note) == (kind, "")
+    np.testing.assert_array_equal(read.pixels[..., 0], codes.astype(int) * np.iinfo(kind).max // (2**bits - 1))
+
+
 def test_a_jpeg_2000_of_boxes_without_end_is_read_at_once(tmp_path: Path):
     import imagecodecs
 
@@ -749,6 +800,48 @@ def test_a_palette_of_8_bits_is_one(tmp_path: Path, spread: int):
     pixels = read_picture(tmp_path / "a.tif").pixels
     assert pixels.dtype == np.uint8
     np.testing.assert_array_equal(pixels, np.moveaxis(colours, 0, -1)[codes])
+
+
+BITS = [*((bits, kind, None) for bits in (2, 4, 6, 10, 12, 14) for kind in ("minisblack", "miniswhite", "rgb"))]
+
+
+@pytest.mark.parametrize(("bits", "photometric", "compression"), [*BITS, (12, "rgb", "jpeg2000")])
+def test_samples_of_any_bits_of_a_tiff_are_white_where_they_are(
+    tmp_path: Path, bits: int, photometric: str, compression: str | None
+):
+    kind, top = (np.uint8, 2**bits - 1) if bits <= 8 else (np.uint16, 2**bits - 1)
+    codes = np.random.default_rng(bits).integers(0, 2**bits, (9, 11, 3 if photometric == "rgb" else 1), kind)
+    codes[0, 0], codes[0, 1] = 0, top
+    plain = codes if photometric == "rgb" else codes[..., 0]
+    path, most = tmp_path / "a.tif", np.iinfo(kind).max
+    tifffile.imwrite(path, plain, photometric=photometric, bitspersample=bits, compression=compression)
+    told = tifffile.imread(path).reshape(codes.shape).astype(int) * most // top
+    read = read_picture(path)
+    assert (read.pixels.dtype, read.note) == (kind, "")
+    np.testing.assert_array_equal(read.pixels, most - told if photometric == "miniswhite" else told)
+
+
+def test_a_palette_of_one_bit_has_two_colours(tmp_path: Path):
+    codes = np.random.default_rng(0).integers(0, 2, (8, 16), np.uint8)
+    colours = np.array([[9, 8, 7], [250, 120, 60]], np.uint8)
+    tifffile.imwrite(tmp_path / "a.tif", codes.astype(bool), photometric="minisblack", extratags=[
+        (320, "H", 6, (colours.T.astype(int) * 257).ravel().tolist(), True)
+    ])  # fmt: skip
+    data = (tmp_path / "a.tif").read_bytes()
+    entry = struct.pack("<HHIH", 262, 3, 1, 1)  # how the samples are meant: 3 is through the palette
+    assert data.count(entry) == 1
+    (tmp_path / "a.tif").write_bytes(data.replace(entry, struct.pack("<HHIH", 262, 3, 1, 3)))
+    np.testing.assert_array_equal(read_picture(tmp_path / "a.tif").pixels, colours[codes])
+
+
+@pytest.mark.parametrize(("bits", "named"), [((5, 6, 5), "5, 6, 5"), ((24, 24, 24), "24")])
+def test_a_tiff_of_odd_bits_is_refused(tmp_path: Path, bits: tuple[int, ...], named: str):
+    tifffile.imwrite(tmp_path / "a.tif", noise(3, np.uint8), photometric="rgb")
+    data = (tmp_path / "a.tif").read_bytes()
+    assert data.count(struct.pack("<3H", 8, 8, 8)) == 1
+    (tmp_path / "a.tif").write_bytes(data.replace(struct.pack("<3H", 8, 8, 8), struct.pack("<3H", *bits)))
+    with pytest.raises(UserError, match=f"{named} bits a channel of a TIFF are not supported; convert it to 16"):
+        read_picture(tmp_path / "a.tif")
 
 
 # What belongs to a picture ------------------------------------------------------------------------------------------

@@ -481,8 +481,10 @@ def test_what_cannot_be_written(device: Device, clip: Path, picture: Path, tmp_p
     with pytest.raises(UserError, match=r"a map cannot show a dissolve; leave out .*m\.%02d\.exr, or 'time.dissolve'"):
         render(device, loop, picture, tmp_path / "out.mp4", maps=sequence)
     write_map(tmp_path / "m.npy", Displacement(np.zeros((HEIGHT, WIDTH, 2), np.float32)))
-    with pytest.raises(UserError, match="do not make a still"):
-        apply(device, tmp_path / "m.npy", clip, tmp_path / "out.png")
+    write_map(tmp_path / "m.001.npy", Displacement(np.zeros((HEIGHT, WIDTH, 2), np.float32)))
+    with pytest.raises(UserError, match="several maps do not make a still"):
+        apply(device, tmp_path / "m.%03d.npy", picture, tmp_path / "out.png")
+    (tmp_path / "m.001.npy").unlink()
     with pytest.raises(UserError, match="do not make an animation"):
         apply(device, tmp_path / "m.npy", picture, tmp_path / "out.gif")
     with pytest.raises(UserError, match="there is no such file"):
@@ -628,7 +630,7 @@ def test_a_map_that_cannot_be_looked_up_or_inverted_is_named(device: Device, tmp
     picture = tmp_path / "in.png"
     write_picture(picture, Picture(scene()))
     write_map(tmp_path / "tiny.exr", Displacement(np.zeros((4, WIDTH * 4 // HEIGHT, 2), np.float32)))
-    with pytest.raises(UserError, match=r"Cannot use .*/tiny\.exr: a map of shape .* from 6 x 6 is wanted\."):
+    with pytest.raises(UserError, match=r"Cannot use .*/tiny\.exr: it is 6 x 4 pixels, and a side must .* 6; make"):
         apply(device, tmp_path / "tiny.exr", picture, tmp_path / "out.png")
     holes = np.zeros((HEIGHT, WIDTH, 2), np.float32)
     holes[3, 4] = np.nan

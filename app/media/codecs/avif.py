@@ -7,12 +7,11 @@ import struct
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from app.errors import UserError
 from app.media.codecs import pillow
 from app.media.codecs.decoding import quiet, start_of
 from app.media.codecs.png import coded
+from app.media.depth import spread
 from app.media.losses import unusual_colours
 from app.model.picture import Picture
 
@@ -29,7 +28,7 @@ def read(file: Path, max_pixels: int) -> Picture:
             import imagecodecs
 
             with quiet():  # Pillow gives 8 bits of these without a word
-                pixels = _spread_to_16(imagecodecs.avif_decode(file.read_bytes()), deep)
+                pixels = spread(imagecodecs.avif_decode(file.read_bytes()), deep, 16)
         picture = pillow.picture_of(image, file, losses, pixels)
         return replace(picture, chunks=coded(primaries, transfer)) if colours else picture
 
@@ -40,11 +39,6 @@ def _bits(file: Path) -> int:
     at = start.find(b"av1C")
     flags = start[at + 6] if 0 <= at < len(start) - 6 else 0
     return 8 if not flags & 0x40 else 12 if flags & 0x20 else 10
-
-
-def _spread_to_16(pixels: np.ndarray, bits: int) -> np.ndarray:
-    """Values of 10 or 12 bits as uint16, black and white where they are."""
-    return (pixels.astype(np.uint32) * 65535 // (2**bits - 1)).astype(np.uint16)
 
 
 def write(path: Path, picture: Picture, quality: int) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 
 from app.errors import UserError
 from app.media.codecs import pillow
-from app.media.codecs.metadata import sized_exif, tag_names
+from app.media.codecs.metadata import sized_exif, tag_names, told_dpi
 from app.media.losses import not_kept
 from app.model.picture import Picture
 
@@ -35,7 +35,11 @@ def read(file: Path, max_pixels: int) -> Picture:
     if (said := _beyond(file.read_bytes())) is not None:
         raise UserError(f"Cannot read {file}: a JPEG {said} is not supported; convert it to a PNG or TIFF of 16 bits.")
     with pillow.opened("JPEG", file, max_pixels) as image:
-        return pillow.picture_of(image, file, _losses(file.read_bytes(), getattr(image, "n_frames", 1) > 1))
+        losses = _losses(file.read_bytes(), getattr(image, "n_frames", 1) > 1)
+        x, y = image.info.get("jfif_density", (1, 1))  # without a unit only the shape of a pixel
+        if image.info.get("jfif_unit") == 0 and x != y and x and y and told_dpi(image.getexif()) is None:
+            losses.append(f"the shape of its pixels ({y}:{x}) is not kept")
+        return pillow.picture_of(image, file, losses)
 
 
 def _beyond(data: bytes) -> str | None:

@@ -6,12 +6,14 @@ import re
 import struct
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from app.errors import UserError
 from app.media.codecs.decoding import start_of
 from app.media.codecs.tiff import plain_depth
+from app.media.depth import spread
 from app.media.inputs import check_size
 from app.media.losses import lost, not_kept
 from app.model.picture import Picture
@@ -38,22 +40,43 @@ def read(name: str, file: Path, max_pixels: int) -> Picture:
     # its own kind is tried first: a TGA with a text of ten letters begins as a PCX does
     with Image.open(file, formats=[own, *sorted(KINDS - {own})]) as image:
         check_size(file, *image.size, max_pixels)
+        further = _after_netpbm(image, file)
         pixels = np.asarray(image.convert(image.palette.mode) if image.mode == "P" and image.palette else image)
     if pixels.dtype == np.int32:  # Pillow's mode for 16-bit grey
         pixels = np.clip(pixels, 0, 65535).astype(np.uint16)
-    losses = _LOSSES[name](file) if name in _LOSSES else []
+    if name == "JPEG 2000" and pixels.ndim == 2 and (bits := _depth(file)[1]) < (most := 8 * pixels.dtype.itemsize):
+        pixels = spread(pixels >> most - bits, bits, most)  # Pillow puts zeros behind, so that white would be grey
+    losses = further + (_LOSSES[name](file) if name in _LOSSES else [])
     return Picture(plain_depth(file, pixels if pixels.ndim == 3 else pixels[..., None]), note=lost(file, losses))
+
+
+def _after_netpbm(image: Any, file: Path) -> list[str]:
+    """What follows the pixels of a binary PBM, PGM or PPM: further pictures, as a rule (pbm(5))."""
+    kind = start_of(file)[:2]
+    if image.format != "PPM" or kind not in (b"P4", b"P5", b"P6") or not image.tile:
+        return []
+    width, height = image.size
+    told = re.match(rb"P[56]" + GAP + rb"\d++" + GAP + rb"\d++" + GAP + rb"(\d{1,5})", start_of(file))
+    size = 2 if told and int(told[1]) > 255 else 1
+    row = -(-width // 8) if kind == b"P4" else width * size * (3 if kind == b"P6" else 1)
+    rest = file.stat().st_size - image.tile[0].offset - row * height
+    return [f"the {rest} bytes after its first picture are not kept"] if rest > len(b"\r\n") else []
 
 
 def _of_jpeg_2000(file: Path) -> list[str]:
     """What a JPEG 2000 has beside its pixels, and how deep they are (ITU-T T.800, A.5.1 and I.4)."""
     losses = [not_kept("box", names)] if (names := list(dict.fromkeys(_boxes(file)))) else []
+    components, bits = _depth(file)
+    return losses + ([f"its {bits} bits a channel become 8"] if bits > 8 and components > 1 else [])
+
+
+def _depth(file: Path) -> tuple[int, int]:
+    """How many components a JPEG 2000 has, and the bits of the first; 1 of 16 where it does not tell."""
     start = start_of(file)
     at = start.find(b"\xff\x4f\xff\x51")  # the start of the codestream, and of what it says of its size
-    if 0 <= at < len(start) - 42:
-        components, bits = int.from_bytes(start[at + 40 : at + 42], "big"), (start[at + 42] & 0x7F) + 1
-        losses += [f"its {bits} bits a channel become 8"] if bits > 8 and components > 1 else []
-    return losses
+    if not 0 <= at < len(start) - 42:
+        return 1, 16
+    return int.from_bytes(start[at + 40 : at + 42], "big"), (start[at + 42] & 0x7F) + 1
 
 
 def _boxes(file: Path, within: tuple[int, int] | None = None) -> Iterator[str]:

@@ -65,7 +65,9 @@ def picture_of(image: Any, file: Path, losses: list[str], pixels: np.ndarray | N
         warnings.simplefilter("always")
         Image.Exif().load(image.info.get("exif", b""))  # read once more: of a JPEG that is done when it is opened
         exif = image.getexif()
-        dpi = told_dpi(exif) if image.format in IN_EXIF else image.info.get("dpi")
+        # Of a JPEG with EXIF that says nothing Pillow says 72.
+        in_exif = image.format in IN_EXIF or (image.format in ("JPEG", "MPO") and not image.info.get("jfif_unit"))
+        dpi = told_dpi(exif) if in_exif else image.info.get("dpi")
         orientation, encoded = exif.get(ORIENTATION, 1), upright_exif(exif)
     if complaints or (exif and encoded is None):
         losses.append("its EXIF is damaged and not kept whole")

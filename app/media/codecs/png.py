@@ -42,17 +42,23 @@ def read(file: Path, max_pixels: int) -> Picture:
         colours = unusual(chunks, image.info.get("icc_profile") is not None)
         losses = [f"its colours are mixed as if sRGB, in spite of its {' and '.join(colours)}"] if colours else []
         losses += unkept
-        if (shape := image.info.get("aspect", (1, 1)))[0] != shape[1]:
+        shape = image.info.get("aspect", (1, 1))
+        if shape[0] != shape[1] and all(shape):  # with a 0 ffmpeg says that it is not known
             losses.append(f"the shape of its pixels ({shape[0]}:{shape[1]}) is not kept")
         pixels, bits = None, _bits(file)
-        if image.mode == "L" and bits in (2, 4) and isinstance(key := image.info.get("transparency"), int):
-            image.info["transparency"] = key * 255 // (2**bits - 1)  # Pillow spreads the pixels, and not their key
+        spread_key(image, bits)
         if bits == 16:
             import imagecodecs
 
             with quiet():
                 pixels = imagecodecs.png_decode(file.read_bytes())  # Pillow gives 8 bits of 16 without a word
         return replace(pillow.picture_of(image, file, losses, pixels), chunks=chunks)
+
+
+def spread_key(image: Any, bits: int) -> None:
+    """Give a grey picture its transparent grey in 8 bits: Pillow spreads the pixels, and not their key."""
+    if image.mode == "L" and bits in (2, 4) and isinstance(key := image.info.get("transparency"), int):
+        image.info["transparency"] = key * 255 // (2**bits - 1)
 
 
 def _bits(file: Path) -> int:

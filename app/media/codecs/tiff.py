@@ -29,6 +29,7 @@ from app.media.codecs.metadata import (
     upright_exif,
     upright_xmp,
 )
+from app.media.depth import spread
 from app.media.inputs import check_size
 from app.media.losses import lost, not_kept
 from app.model.picture import Picture
@@ -102,15 +103,22 @@ def read(file: Path, max_pixels: int, place: int | None = None) -> Picture:
         photometric = tifffile.PHOTOMETRIC(page.photometric).name
         if photometric == "YCBCR" and int(page.compression) not in DECODED:
             raise UserError(f"Cannot read {file}: a TIFF in YCbCr is not supported but as JPEG; convert it to RGB.")
+        told = page.bitspersample
+        bits = told if isinstance(told, int) else 0
+        if not bits or 16 < bits < 32:  # of which tifffile does not heed the order of bytes
+            named = str(told).strip("()")
+            raise UserError(
+                f"Cannot read {file}: {named} bits a channel of a TIFF are not supported; convert it to 16."
+            )
         losses = _losses(tiff) if place is None else []
         if unkept := [tag.name for tag in page.tags if tag.code not in UNDERSTOOD]:
             losses.append(not_kept("tag", unkept))
         pixels = page.asarray()
-        losses += _cut(pixels, page.bitspersample)
+        losses += _cut(pixels, bits)
         place_of_tags, layout = page.offset, (tiff.byteorder, tiff.is_bigtiff)
     is_half = pixels.dtype == np.float16
     pixels = np.moveaxis(pixels, 0, -1) if page.axes == "SYX" else pixels.reshape(*pixels.shape[:2], -1)
-    pixels = plain_depth(file, pixels)
+    pixels = plain_depth(file, pixels, bits if photometric != "PALETTE" else None)
     icc = tags.get(34675)
     colours = COLOURS.get(photometric, 3)
     used = colours + bool(page.extrasamples and photometric not in ("PALETTE", "SEPARATED"))
@@ -122,10 +130,10 @@ def read(file: Path, max_pixels: int, place: int | None = None) -> Picture:
     if tuple(kinds) == (tifffile.EXTRASAMPLE.UNSPECIFIED,):
         losses.append(f"its sample {used} is of no kind that it names, and is taken for alpha")
     if photometric == "PALETTE":
-        pixels = _palette(tags[320])[pixels[..., 0]]
+        pixels = _palette(tags[320])[pixels[..., 0] if bits > 1 else pixels[..., 0] >> 7]
     elif photometric == "SEPARATED":
-        pixels, icc, told = cmyk_to_rgb(pixels, icc)
-        losses.append(told)
+        pixels, icc, turned = cmyk_to_rgb(pixels, icc)
+        losses.append(turned)
     elif photometric == "MINISWHITE" and pixels.dtype != np.float32:
         pixels = _ink_to_light(pixels, premultiplied)
     elif photometric not in ("MINISBLACK", "RGB", "YCBCR"):
@@ -212,15 +220,20 @@ def _cut(pixels: np.ndarray, bits: int) -> list[str]:
     return []
 
 
-def plain_depth(file: Path, pixels: np.ndarray) -> np.ndarray:
-    """Samples of any kind and shape as uint8, uint16 or float32, whole numbers by their full range."""
-    kind = pixels.dtype.kind
+def plain_depth(file: Path, pixels: np.ndarray, bits: int | None = None) -> np.ndarray:
+    """Samples of any kind and shape as uint8, uint16 or float32, whole numbers by their full range.
+
+    bits: that are used of each, the lowest; None are all.
+    """
+    kind, bits = pixels.dtype.kind, bits or 8 * pixels.dtype.itemsize
     if kind == "b":
         return pixels.astype(np.uint8) * np.uint8(255)
     if kind == "f":
         return pixels.astype(np.float32)
     if kind == "u" and pixels.dtype.itemsize == 4:
         return (pixels >> 16).astype(np.uint16)
+    if kind == "u" and bits < 8 * pixels.dtype.itemsize <= 16:
+        return spread(pixels, bits, 8 * pixels.dtype.itemsize)
     if kind == "u" and pixels.dtype.itemsize <= 2:
         return pixels.astype(pixels.dtype.newbyteorder("="))
     raise UserError(f"Cannot read {file}: samples of {pixels.dtype} are not supported; convert to uint16 or float32.")

@@ -1,0 +1,242 @@
+"""Frames of an animated PNG or GIF, against the laws of alpha in float64 and against ffmpeg; and damaged ones."""
+
+from __future__ import annotations
+
+import struct
+import subprocess
+import zlib
+from collections.abc import Sequence
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from app.errors import UserError
+from app.media.codecs import apng
+from app.media.ffmpeg import executable
+from app.media.pages import read_pages
+from app.media.pictures import read_picture
+
+WIDTH, HEIGHT = 16, 12
+Part = tuple[int, int, np.ndarray, int, int]
+"""x, y, the pixels, what becomes of it (0 stays, 1 cleared, 2 as before), whether it is laid over what is there."""
+
+
+def chunk(kind: bytes, body: bytes) -> bytes:
+    return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
+
+
+def encoded(parts: Sequence[Part], default: bool = False, colour: int = 6, bits: int = 8, more: bytes = b"") -> bytes:
+    """An animated PNG; `default` has a picture before it for readers that know none."""
+
+    def rows(pixels: np.ndarray) -> bytes:
+        kind = ">u2" if bits == 16 else "u1"
+        return zlib.compress(b"".join(b"\0" + row.astype(kind).tobytes() for row in pixels))
+
+    data = b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", WIDTH, HEIGHT, bits, colour, 0, 0, 0))
+    data += chunk(b"acTL", struct.pack(">II", len(parts), 3)) + more
+    data += chunk(b"IDAT", rows(np.full((HEIGHT, WIDTH, 4), 77))) if default else b""
+    for number, (x, y, pixels, disposal, over) in enumerate(parts):
+        size = pixels.shape[1], pixels.shape[0], x, y, number + 1, 10, disposal, over
+        data += chunk(b"fcTL", struct.pack(">IIIIIHHBB", 2 * number, *size))
+        first = number == 0 and not default
+        data += chunk(b"IDAT", rows(pixels)) if first else chunk(b"fdAT", struct.pack(">I", 1) + rows(pixels))
+    return data + chunk(b"IEND", b"")
+
+
+def composed(parts: Sequence[Part]) -> list[np.ndarray]:
+    """What is seen of each part in turn, in float64."""
+    canvas, seen = np.zeros((HEIGHT, WIDTH, 4)), []
+    for number, (x, y, pixels, disposal, over) in enumerate(parts):
+        place, before = (slice(y, y + len(pixels)), slice(x, x + pixels.shape[1])), canvas.copy()
+        own, below = pixels.astype(float), canvas[place]
+        if over:
+            share, rest = own[..., 3:] / 255, below[..., 3:] / 255 * (1 - own[..., 3:] / 255)
+            with np.errstate(invalid="ignore"):
+                colours = np.nan_to_num((own[..., :3] * share + below[..., :3] * rest) / (share + rest))
+            own = np.concatenate([colours, 255 * (share + rest)], axis=2)
+        canvas[place] = own
+        seen.append(canvas.copy())
+        if disposal == 2 and number:
+            canvas = before
+        elif disposal:
+            canvas[place] = 0
+    return seen
+
+
+def some(rng: np.random.Generator, height: int = HEIGHT, width: int = WIDTH) -> np.ndarray:
+    pixels = rng.integers(0, 256, (height, width, 4))
+    pixels[..., 3] = rng.choice([0, 255, 90, 200], (height, width))
+    return pixels
+
+
+@pytest.mark.parametrize("default", [False, True])
+@pytest.mark.parametrize("seed", range(4))
+def test_frames_are_laid_over_one_another_as_alpha_says(tmp_path: Path, seed: int, default: bool):
+    rng = np.random.default_rng(seed)
+    parts: list[Part] = [(0, 0, some(rng), int(rng.integers(3)), 0)]
+    for _ in range(6):
+        width, height = rng.integers(1, (WIDTH, HEIGHT))
+        x, y = rng.integers(0, (WIDTH - width + 1, HEIGHT - height + 1))
+        parts.append((int(x), int(y), some(rng, height, width), int(rng.integers(3)), int(rng.integers(2))))
+    (path := tmp_path / "a.png").write_bytes(encoded(parts, default))
+    clip = read_pages(path, read_picture(path))
+    assert clip is not None
+    assert (clip.loops, clip.durations, clip.alpha) == (3, (1, 2, 3, 4, 5, 6, 7), True)
+    command = [executable(), "-v", "error", "-f", "apng", "-i", path, "-fps_mode", "passthrough"]
+    done = subprocess.run([*command, "-f", "rawvideo", "-pix_fmt", "rgba", "-"], capture_output=True, check=True)
+    theirs = np.frombuffer(done.stdout, np.uint8).reshape(-1, HEIGHT, WIDTH, 4)
+    for (_, read), wanted, other in zip(clip.pictures(), composed(parts), theirs, strict=True):
+        seen = wanted[..., 3] > 0
+        assert np.abs(read.pixels - wanted)[seen].max(initial=0) < 1  # of half a code is each rounded to
+        assert not read.pixels[~seen, 3].any()
+        assert np.abs(other[..., 3] - wanted[..., 3]).max() <= 3
+
+
+def test_what_covers_all_or_nothing_changes_no_bit(tmp_path: Path):
+    rng = np.random.default_rng(0)
+    under, over = some(rng), some(rng)
+    under[..., 3], over[..., 3] = rng.integers(0, 256, (HEIGHT, WIDTH)), 255 * rng.integers(0, 2, (HEIGHT, WIDTH))
+    (path := tmp_path / "a.png").write_bytes(encoded([(0, 0, under, 0, 0), (0, 0, over, 0, 1)]))
+    clip = read_pages(path, read_picture(path))
+    assert clip is not None
+    _, (_, read) = clip.pictures()
+    np.testing.assert_array_equal(read.pixels, np.where(over[..., 3:] == 255, over, under))
+
+
+def test_what_is_cleared_is_transparent_though_no_frame_is(tmp_path: Path):
+    parts = [(0, 0, np.full((HEIGHT, WIDTH, 3), 9), 0, 0), (2, 2, np.full((4, 4, 3), 50), 1, 0)]
+    parts.append((0, 0, np.full((1, 1, 3), 99), 0, 0))
+    (path := tmp_path / "a.png").write_bytes(encoded(parts, colour=2))
+    clip = read_pages(path, read_picture(path))
+    assert clip is not None
+    assert [(read.pixels[..., 3] == 0).sum() for _, read in clip.pictures()] == [0, 0, 16]
+
+
+def test_an_animation_has_alpha_only_where_something_is_seen_through(tmp_path: Path):
+    whole, part = np.full((HEIGHT, WIDTH, 4), 255), np.full((4, 4, 4), 255)
+    clear = part - [0, 0, 0, 255]
+    for parts, seen in {
+        "whole": ([(0, 0, whole, 1, 0), (0, 0, whole, 0, 0)], False),
+        "left bare": ([(0, 0, whole, 1, 0), (0, 0, part, 0, 0)], True),
+        "bare at the end": ([(0, 0, whole, 0, 0), (0, 0, part, 1, 0)], False),
+        "covered again": ([(0, 0, whole, 0, 0), (2, 2, part, 1, 0), (2, 2, part, 0, 0)], False),
+        "one aside": ([(0, 0, whole, 0, 0), (2, 2, part, 1, 0), (3, 2, part, 0, 0)], True),
+        "one above": ([(0, 0, whole, 0, 0), (2, 2, part, 1, 0), (2, 1, part, 0, 0)], True),
+        "as before": ([(0, 0, whole, 0, 0), (2, 2, part, 2, 0), (3, 2, part, 0, 0)], False),
+        "nothing before": ([(0, 0, whole, 2, 0), (3, 2, part, 0, 0)], True),
+        "see-through": ([(0, 0, whole, 0, 0), (2, 2, clear, 0, 0)], True),
+        "laid over": ([(0, 0, whole, 0, 0), (2, 2, clear, 0, 1)], False),
+    }.values():
+        found = apng.read(encoded(parts))
+        assert found is not None
+        assert found.has_alpha() == seen
+        assert any(canvas[..., 3].min() < 255 for canvas in found.shown()) == seen
+
+
+@pytest.mark.parametrize("colour", [0, 2, 4, 6])
+def test_frames_of_16_bits_are_read_in_8(tmp_path: Path, colour: int):
+    channels = {0: 1, 2: 3, 4: 2, 6: 4}[colour]
+    pixels = np.random.default_rng(colour).integers(0, 65536, (2, HEIGHT, WIDTH, channels))
+    data = encoded([(0, 0, pixels[0], 0, 0), (0, 0, pixels[1], 0, 0)], colour=colour, bits=16)
+    (path := tmp_path / "a.png").write_bytes(data)
+    found = apng.read(path.read_bytes())
+    assert found is not None
+    for canvas, wanted in zip(found.shown(), pixels >> 8, strict=True):
+        colours = wanted[..., :1].repeat(3, axis=2) if channels < 3 else wanted[..., :3]
+        np.testing.assert_array_equal(canvas[..., :3], colours)
+        np.testing.assert_array_equal(canvas[..., 3], wanted[..., -1] if channels in (2, 4) else 255)
+
+
+def test_times_and_transparent_colours_of_frames(tmp_path: Path):
+    grey = np.random.default_rng(0).integers(0, 2, (HEIGHT, WIDTH, 1))
+    key = chunk(b"tRNS", struct.pack(">H", 1))
+    data = encoded([(0, 0, grey, 0, 0), (0, 0, 1 - grey, 0, 0)], colour=0, more=key)
+    (path := tmp_path / "a.png").write_bytes(data)
+    found = apng.read(path.read_bytes())
+    assert found is not None
+    assert [frame.seconds for frame in found.frames] == [Fraction(1, 10), Fraction(2, 10)]
+    first, second = (canvas.copy() for canvas in found.shown())
+    np.testing.assert_array_equal(first[..., 3], np.where(grey[..., 0] == 1, 0, 255))
+    np.testing.assert_array_equal(second[..., 3], np.where(grey[..., 0] == 0, 0, 255))
+    control = data.index(b"fcTL") + 4
+    short = data[:control] + data[control : control + 22] + b"\0\0" + data[control + 24 :]
+    path.write_bytes(
+        short[: control + 26] + struct.pack(">I", zlib.crc32(short[control - 4 : control + 26])) + short[control + 30 :]
+    )
+    again = apng.read(path.read_bytes())
+    assert again is not None
+    assert again.frames[0].seconds == Fraction(1, 100)
+
+
+@pytest.mark.parametrize("fault", ["cut", "few", "beyond", "flipped"])
+def test_a_damaged_animation_is_told_as_that(tmp_path: Path, fault: str):
+    pixels = some(np.random.default_rng(0))
+    data = encoded([(0, 0, pixels, 0, 0), (0, 0, pixels[:4, :4], 0, 1)])
+    match fault:
+        case "cut":
+            data = data[:-40]
+        case "few":
+            at = data.rindex(b"fcTL") - 4
+            data = data[:at] + chunk(b"IEND", b"")
+        case "beyond":
+            data = encoded([(0, 0, pixels, 0, 0), (WIDTH - 3, 0, pixels[:4, :4], 0, 1)])
+        case _:
+            at = data.rindex(b"fdAT") + 20
+            data = data[:at] + bytes([data[at] ^ 1]) + data[at + 1 :]
+    (path := tmp_path / "a.png").write_bytes(data)
+    with pytest.raises(UserError, match=r"a\.png: the PNG file is truncated or damaged .*; get it again\.$"):
+        read_pages(path, read_picture(path))
+
+
+def gif(parts: Sequence[tuple[int, int, np.ndarray, int, int | None]], colours: np.ndarray) -> bytes:
+    """A GIF of eight colours: x, y, the numbers of colours, what becomes of it, and the number that is none."""
+    data = b"GIF89a" + struct.pack("<HHBBB", WIDTH, HEIGHT, 0xF2, 0, 0) + colours.astype(np.uint8).tobytes()
+    for x, y, numbers, disposal, key in parts:
+        data += struct.pack("<BBBBHBB", 0x21, 0xF9, 4, disposal << 2 | (key is not None), 10, key or 0, 0)
+        data += struct.pack("<BHHHHB", 0x2C, x, y, numbers.shape[1], numbers.shape[0], 0)
+        # Of 4 bits each: a code that clears before what would need 5, the numbers, and the end.
+        codes = [code for at, one in enumerate(numbers.ravel()) for code in ([8] * (at % 6 == 0) + [int(one)])] + [9]
+        nibbles = [*codes, 0][: len(codes) + len(codes) % 2]
+        packed = bytes(low | high << 4 for low, high in zip(nibbles[::2], nibbles[1::2], strict=True))
+        blocks = [packed[at : at + 255] for at in range(0, len(packed), 255)]
+        data += b"\3" + b"".join(bytes([len(block)]) + block for block in blocks) + b"\0"
+    return data + b";"
+
+
+@pytest.mark.parametrize("key", [None, 5])
+def test_what_a_gif_clears_is_transparent_though_its_first_frame_is_opaque(tmp_path: Path, key: int | None):
+    rng = np.random.default_rng(0)
+    colours, numbers = rng.integers(0, 256, (8, 3)), rng.integers(0, 8, (4, HEIGHT, WIDTH))
+    parts = [
+        (0, 0, numbers[0], 1, key),
+        (2, 1, numbers[1][:6, :7], 2, 3),
+        (8, 4, numbers[2][:5, :5], 3, 1),
+        (1, 1, numbers[3][:3, :3], 0, 2),
+    ]
+    (path := tmp_path / "a.gif").write_bytes(gif(parts, colours))
+    clip = read_pages(path, read_picture(path))
+    assert clip is not None
+    over = [
+        (
+            x,
+            y,
+            np.dstack([colours[part], np.where(part == none, 0, 255)[..., None]]),
+            {1: 0, 0: 0, 2: 1, 3: 2}[disposal],
+            1,
+        )
+        for x, y, part, disposal, none in parts
+    ]
+    for (_, read), wanted in zip(clip.pictures(), composed(over), strict=True):
+        seen = wanted[..., 3] > 0
+        np.testing.assert_array_equal(read.pixels[..., 3] > 0, seen)
+        np.testing.assert_array_equal(read.pixels[seen], wanted[seen])
+    (_, later), *_ = clip.pictures((2, None))
+    np.testing.assert_array_equal(later.pixels[..., 3], composed(over)[2][..., 3])
+
+
+def test_a_still_is_no_animation(tmp_path: Path):
+    Image.new("RGB", (8, 8)).save(tmp_path / "a.png")
+    assert apng.read((tmp_path / "a.png").read_bytes()) is None
