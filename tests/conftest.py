@@ -135,6 +135,7 @@ def shared_device() -> Iterator[Device]:
 @pytest.fixture
 def device(shared_device: Device) -> Iterator[Device]:
     """The headless device; fails the test that leaves a GL error behind."""
+    shared_device.use()  # the last test may have used one of its own
     assert shared_device.ctx.error == "GL_NO_ERROR"
     yield shared_device
     assert shared_device.ctx.error == "GL_NO_ERROR"
