@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from fractions import Fraction
 
 from app.media.codecs.layered import Animation, Frame
+from app.media.losses import few
 
 SIGNATURE = 8
 KEPT = (b"PLTE", b"tRNS")
@@ -51,7 +52,7 @@ def _chunks(data: bytes) -> Iterator[tuple[bytes, bytes]]:
         length, kind = struct.unpack_from(">I4s", data, at)
         body, check = data[at + 8 : at + 8 + length], data[at + 8 + length : at + 12 + length]
         if len(check) < 4 or struct.unpack(">I", check)[0] != zlib.crc32(body, zlib.crc32(kind)):
-            raise ValueError(f"its chunk {kind.decode('latin-1')} is damaged")
+            raise ValueError(f"its chunk {few([kind.decode('latin-1')])} is damaged")
         if kind == b"IEND":
             return
         yield kind, body
