@@ -336,6 +336,11 @@ def leads_too_far(led: RecipeHandle | RecipePin, extent: Point) -> bool:
     return _Way("", led, extent).far > LARGEST_LEAD
 
 
+def reach_of(led: RecipeHandle | RecipePin, extent: Point) -> float:
+    """How far it reaches as a whole, in longer sides: its radius, or what its line needs."""
+    return _Way("", led, extent).reach
+
+
 class _Way:
     """Where a handle or a pin leads its corners: before and after, (n, 2) in longer sides."""
 

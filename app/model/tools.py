@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterator
+from copy import copy
 from dataclasses import dataclass
 from itertools import pairwise
 from math import ceil, hypot
@@ -52,7 +53,7 @@ class Press:
         extent: (width, height) of the picture, the longer of them 1.
         dt: seconds a tick.
         last: where the last stroke ended, for a straight line from there.
-        detail: how finely the flow of such a brush is solved; see `app.model.windows`.
+        detail: how finely the flow of such a brush is solved; see `app.model.windows`. `finely` gives handles theirs.
         slack: how far the pointer may shake, in longer sides, and is not moved yet.
         string: by how long a string the pen pulls the brush, in longer sides; see `PulledString`.
         at: the place in the original of what was pressed on.
@@ -68,6 +69,7 @@ class Press:
     dt: float
     last: tuple[float, float] | None = None
     detail: int = 0
+    finely: Callable[[RecipeHandle], RecipeHandle] = copy
     slack: float = 0.0
     string: float = 0.0
     at: tuple[float, float] = (0.0, 0.0)
@@ -330,7 +332,7 @@ def _held(press: Press, tick: int, **what: Any) -> RecipeHandle:
     """A handle that holds what was taken from a tick on, and has been led nowhere."""
     brush = press.brush
     parts = {"keys": (), "radius": brush.radius, "stiffness": brush.stiffness, "local": brush.local}
-    return RecipeHandle.model_validate({"start": tick * press.dt, **parts, **what})
+    return press.finely(RecipeHandle.model_validate({"start": tick * press.dt, **parts, **what}))
 
 
 TOOLS = (

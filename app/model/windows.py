@@ -10,11 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import ceil, log
-from typing import NamedTuple, Self
+from typing import NamedTuple, Self, TypeVar
 
 import numpy as np
 
+from app.model.handles import RecipeHandle, RecipePin, reach_of
 from app.model.recipe import FluidSettings, Recipe
+from app.model.sampling import Point
 from app.model.strokes import FINEST_DETAIL, Act
 from solver.grid import SMALLEST_GRID, Grid
 
@@ -37,6 +39,8 @@ SLOWEST = 52.3 / 14.0**2  # of a window of 14 radii, times mu / radius^2
 
 FLOWING = ("push", "curve", "twirl", "bloat", "pinch")
 """The tools that move the fluid."""
+
+SomeLed = TypeVar("SomeLed", bound=RecipeHandle | RecipePin)
 
 
 def detail_for(radius: float, recipe: Recipe, settings: FluidSettings) -> int:
@@ -65,6 +69,12 @@ def detail_for_led(reach: float, recipe: Recipe, settings: FluidSettings) -> int
     if not _is_soon_at_rest(reach, settings):
         detail = min(detail, CELLS)
     return detail if detail >= FINER * settings.grid else min(detail, settings.grid)
+
+
+def with_detail(led: SomeLed, recipe: Recipe, extent: Point) -> SomeLed:
+    """A handle or a pin of a recipe with the detail that it deserves where it begins."""
+    settings = recipe.fluid_at(led.first_tick(recipe.fluid.dt))
+    return led.model_copy(update={"detail": detail_for_led(reach_of(led, extent), recipe, settings)})
 
 
 def _is_soon_at_rest(radius: float, settings: FluidSettings) -> bool:

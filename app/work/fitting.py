@@ -662,7 +662,7 @@ class _Search:
         if any(edit.tick > 0 for edit in recipe.mask):
             return np.array(self.numbers, int)
         replay = Replay(self.device, recipe, self.fine.pictures, budget=0)
-        solid, (nx, ny) = replay.fluid.solid.get() == 255, replay.grid.size
+        solid, (nx, ny) = replay.solid, replay.grid.size
         replay.release()
         cells = np.arange(nx * ny).reshape(ny, nx)
         across, down = ~solid[:, :-1] & ~solid[:, 1:], ~solid[:-1] & ~solid[1:]
@@ -695,11 +695,13 @@ def _coarse(recipe: Recipe) -> Recipe:
 
 def _strain(replay: Replay) -> float:
     """The root mean square of grad u at this moment, of what carries the picture."""
-    faces, (hx, hy) = replay.fluid.carrier().get().astype(np.float64), replay.fluid.grid.spacing
+    grid, (width, height) = replay.fluid.grid, replay.grid.extent
+    faces, (hx, hy) = replay.fluid.carrier().get().astype(np.float64), grid.spacing
     faces = np.pad(faces, ((0, 1), (0, 1), (0, 0)))  # the far walls
     velocity = np.stack([faces[:-1, :-1, 0] + faces[:-1, 1:, 0], faces[:-1, :-1, 1] + faces[1:, :-1, 1]], axis=-1) / 2
     slopes = np.gradient(velocity, hx, axis=1), np.gradient(velocity, hy, axis=0)
-    return float(np.sqrt(sum((slope**2).sum(axis=-1).mean() for slope in slopes)))
+    part = 1.0 if grid.is_whole else grid.extent[0] * grid.extent[1] / (width * height)  # the rest is at rest
+    return float(np.sqrt(part * sum((slope**2).sum(axis=-1).mean() for slope in slopes)))
 
 
 def _is_fitted(handle: RecipeHandle) -> int:

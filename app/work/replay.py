@@ -247,6 +247,16 @@ class Replay:
             self._led_of, self._led = recipe, sorted(led, key=lambda each: isinstance(each[1], RecipeHandle))
         return self._led
 
+    @property
+    def solid(self) -> np.ndarray:
+        """The cells of the whole picture that are wholly closed, (ny, nx); reads back from the GPU."""
+        if self.window is None:
+            return self.fluid.solid.get() == 255
+        x, y = self.grid.centres()
+        frozen = self.masks.frozen.get() >= 128  # from a half on
+        (rows, columns), (width, height) = frozen.shape, self.grid.extent
+        return frozen[(y / height * rows).astype(int), (x / width * columns).astype(int)]
+
     def as_seen(self, values: np.ndarray, grid: Grid) -> np.ndarray:
         """Values of the original's cells, (ny, nx) or (ny, nx, c), where the warp shows them at this moment."""
         if self.tick == 0 and self.recipe.map is None:
