@@ -36,6 +36,8 @@ ROOM_OF_LED = 3.0  # of a handle: as far as it reaches beside others (WIDE in so
 # The slowest flow between sticking sides of length a fades at 52.3 mu / a^2 (the buckling mode of a clamped plate).
 LONGEST_FLOW = 0.2
 SLOWEST = 52.3 / 14.0**2  # of a window of 14 radii, times mu / radius^2
+# Of a handle nothing goes on once it has arrived, but its own push: a mode of k^2 = 12 / radius^2, as that of a brush.
+OWN = 12.0
 
 FLOWING = ("push", "curve", "twirl", "bloat", "pinch")
 """The tools that move the fluid."""
@@ -51,7 +53,7 @@ def detail_for(radius: float, recipe: Recipe, settings: FluidSettings) -> int:
         recipe: which the stroke is made in.
         settings: the fluid's at that tick.
     """
-    if not may_have_windows(recipe) or not _is_soon_at_rest(radius, settings):
+    if not may_have_windows(recipe) or not _fades_soon(settings, SLOWEST / radius**2):
         return 0
     detail = _detail_of(radius, LEAST_PER_RADIUS)
     return detail if detail >= FINER * settings.grid else 0
@@ -60,13 +62,13 @@ def detail_for(radius: float, recipe: Recipe, settings: FluidSettings) -> int:
 def detail_for_led(reach: float, recipe: Recipe, settings: FluidSettings) -> int:
     """The detail that a handle or a pin deserves which reaches so far, in longer sides.
 
-    What is not soon at rest has no window that is smaller than the picture, and cells as small as that leaves. One of a
-    large radius moves on the whole picture's cells; but not all that others do while it is at rest.
+    In what flows on and on it has no window that is smaller than the picture, and cells as small as that leaves. One of
+    a large radius moves on the whole picture's cells; but not all that others do while it is at rest.
     """
     if not may_have_windows(recipe):
         return 0
     detail = _detail_of(reach, LEAST_PER_LED)
-    if not _is_soon_at_rest(reach, settings):
+    if not _fades_soon(settings, OWN / reach**2):
         detail = min(detail, CELLS)
     return detail if detail >= FINER * settings.grid else min(detail, settings.grid)
 
@@ -77,10 +79,9 @@ def with_detail(led: SomeLed, recipe: Recipe, extent: Point) -> SomeLed:
     return led.model_copy(update={"detail": detail_for_led(reach_of(led, extent), recipe, settings)})
 
 
-def _is_soon_at_rest(radius: float, settings: FluidSettings) -> bool:
-    """True if what flows around such a brush does not come to the sides of its window."""
-    fading = settings.drag + SLOWEST * settings.viscosity / radius**2
-    return fading * LONGEST_FLOW >= 1.0
+def _fades_soon(settings: FluidSettings, squared_wavenumber: float) -> bool:
+    """True if a flow of this kind is gone before the sides of a window are felt."""
+    return (settings.drag + squared_wavenumber * settings.viscosity) * LONGEST_FLOW >= 1.0
 
 
 def _detail_of(radius: float, least: float) -> int:

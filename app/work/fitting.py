@@ -34,6 +34,7 @@ from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.model.sampling import Point
 from app.model.schema import label_of
+from app.model.windows import with_detail
 from app.progress import Progress
 from app.work.loaded_handles import LoadedHandles
 from app.work.replay import Replay
@@ -597,7 +598,14 @@ class _Search:
             }
             handles[self._slots[row]] = lead.handle.model_copy(update=lead.course(part) | values_of)
         fluid = base.fluid.model_copy(update={"viscosity": values[-1]})
-        return base.edited(handle=tuple(handles.values()), fluid=fluid)
+        recipe = base.edited(handle=tuple(handles.values()), fluid=fluid)
+        if base is not self.fine.recipe:  # where windows would cost what the coarse grid saves
+            return recipe
+        extent = self.extent[0], self.extent[1]
+        for slot in self._slots:
+            if not self.aim.own or handles[slot].detail:
+                handles[slot] = with_detail(handles[slot], recipe, extent)
+        return recipe.edited(handle=tuple(handles.values()))
 
     @property
     def _slots(self) -> list[int]:
@@ -690,7 +698,10 @@ def _coarse(recipe: Recipe) -> Recipe:
     settings = recipe.fluid.model_copy(update={"grid": min(recipe.fluid.grid, COARSE_GRID)})
     if not (recipe.stroke or recipe.change or recipe.mask):  # which are told in ticks
         settings = settings.model_copy(update={"dt": max(settings.dt, min(COARSE_DT, recipe.duration / 24))})
-    return recipe.edited(fluid=settings)
+    handles, pins = (
+        tuple(led.model_copy(update={"detail": 0}) for led in each) for each in (recipe.handle, recipe.pin)
+    )
+    return recipe.edited(fluid=settings, handle=handles, pin=pins)
 
 
 def _strain(replay: Replay) -> float:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from app.media.auxiliary import Pictures
+from app.model.handles import RecipeHandle, RecipePin
 from app.model.picture import Picture
 from app.model.presets import HONEY, PUTTY, WATER, Feel
 from app.model.recipe import FluidSettings, Recipe
 from app.model.strokes import Act, Dab, Stroke
-from app.model.windows import CELLS, FlowWindow, detail_for
+from app.model.windows import CELLS, FlowWindow, Led, detail_for, detail_for_led, with_detail
 from app.work.replay import Replay
 from solver.gl.device import Device
 from solver.grid import Grid
@@ -109,13 +112,82 @@ def test_a_window_lies_in_any_picture(size: tuple[int, int], place: tuple[float,
             assert window.detail <= detail
 
 
+# -- of handles -------------------------------------------------------------------------------------------------------
+
+
+def led(*places: tuple[float, float], detail: int = 512, way: float = 0.0, begins: bool = False, **more: Any) -> Led:
+    """A handle of radius .04 at places in longer sides, which moves so far to the right in a tick, or rests."""
+    here, given = np.array(places), {"reach": 0.04, "push": 0.04} | more
+    there = here + np.array([way, 0.0])
+    return Led(detail=detail, here=here, then=there, is_moving=way > 0, begins=begins, **given)
+
+
+@pytest.mark.parametrize("feel", [PUTTY, HONEY, WATER])
+@pytest.mark.parametrize("radius", [0.001, 0.01, 0.05, 0.09])
+def test_a_handle_has_18_to_24_cells_a_radius(feel: Feel, radius: float):
+    recipe = Recipe(fluid=FluidSettings(viscosity=feel.viscosity, drag=feel.drag, grid=96))
+    detail = detail_for_led(radius, recipe, recipe.fluid)
+    assert 18 - 1e-1 <= detail * radius <= 24 + 1e-1
+
+
+def test_a_handle_that_needs_no_window_does_not_keep_others_from_theirs():
+    recipe = Recipe(fluid=FluidSettings(viscosity=HONEY.viscosity, drag=HONEY.drag, grid=96))
+    assert 0 < detail_for_led(0.4, recipe, recipe.fluid) <= 96
+    # What flows on and on has cells as small as the whole picture may have.
+    assert detail_for_led(0.01, recipe, FluidSettings(viscosity=1e-7, grid=96)) == CELLS
+    for other in ({"mode": "density"}, {"fluid": FluidSettings(solver="paper")}):
+        assert detail_for_led(0.01, recipe.edited(**other), recipe.fluid) == 0
+
+
+def test_handles_that_move_have_room_and_what_is_at_rest_elsewhere_needs_none():
+    far = led((0.05, 0.6))
+    window = FlowWindow.of([], None, WHOLE, [led((0.7, 0.3), way=0.002), far])
+    assert window is not None
+    assert window.detail == 512
+    (left, top), (width, height) = window.grid_in(WHOLE).origin, window.grid_in(WHOLE).extent
+    assert left <= 0.7 - 3 * 0.04
+    assert left + width >= 0.702 + 3 * 0.04
+    assert top <= 0.3 - 3 * 0.04
+    assert top + height >= 0.3 + 3 * 0.04
+    # At rest, all stay in it; and where they hold against a stroke elsewhere, it has room for both.
+    assert FlowWindow.of([], window, WHOLE, [led((0.7, 0.3)), far]) == window
+    beside = FlowWindow.of([Act(stroke(0.02, detail=682), 0, at(0.1, 0.9, 0.1, 0.9))], window, WHOLE, [far])
+    assert beside is not None
+    assert beside.detail == 682
+    grid = beside.grid_in(WHOLE)
+    assert grid.origin[0] <= 0.05 - 0.04 or grid.at_edge[0]
+    assert grid.origin[1] <= 0.6 - 0.04
+
+
+def test_handles_too_far_apart_for_a_fine_window_have_a_coarser_one():
+    near, far = led((0.1, 0.1), way=0.002), led((0.9, 0.6), way=0.002)
+    window = FlowWindow.of([], None, Grid.for_picture(6000, 4000, 96), [near, far])
+    assert window is not None
+    assert window.detail == CELLS
+    assert window.grid_in(WHOLE).is_whole
+    assert FlowWindow.of([], None, WHOLE, [near, far]) is None
+    # One that sets out asks anew for as fine a window as it may have; one that goes on keeps the coarser one.
+    coarse = FlowWindow(384, 60, 0)
+    assert FlowWindow.of([], coarse, WHOLE, [led((0.4, 0.3), way=0.002)]) == coarse
+    anew = FlowWindow.of([], coarse, WHOLE, [led((0.4, 0.3), way=0.002, begins=True)])
+    assert anew is not None
+    assert anew.detail == 512
+
+
+def test_one_handle_on_the_whole_picture_has_all_there():
+    here = led((0.5, 0.3), way=0.002)
+    assert FlowWindow.of([], FlowWindow(512, 100, 30), WHOLE, [here, led((0.1, 0.1), detail=0)]) is None
+    assert FlowWindow.of([Act(stroke(), 0, at(0.5, 0.5, 0.5, 0.5))], None, WHOLE, [led((0.1, 0.1), detail=0)]) is None
+
+
 # -- replayed ---------------------------------------------------------------------------------------------------------
 
 SIZE = 900, 600
+FINE = 3000, 2000  # six texels a cell of a window and more
 
 
-def replayed(device: Device, recipe: Recipe, budget: int = 0) -> Replay:
-    return Replay(device, recipe, Pictures(Picture(np.zeros((SIZE[1], SIZE[0], 3), np.uint8))), budget)
+def replayed(device: Device, recipe: Recipe, budget: int = 0, size: tuple[int, int] = SIZE) -> Replay:
+    return Replay(device, recipe, Pictures(Picture(np.zeros((size[1], size[0], 3), np.uint8))), budget)
 
 
 def painted(*strokes: Stroke, feel: Feel = PUTTY, cells: int = 64, ticks: int = 60) -> Recipe:
@@ -277,6 +349,113 @@ def test_any_strokes_in_windows_give_the_same_bytes_by_any_path(device: Device, 
         other.seek(tick)
         same(other.snapshot(), moments[tick])
         other.use(recipe.edited(stroke=recipe.stroke[: int(rng.integers(5))]))
+        other.use(recipe)
+        same(other.snapshot(), moments[tick])
+        start = int(rng.integers(recipe.ticks))
+        other.resume(start, moments[start])
+        other.advance()
+        same(other.snapshot(), moments[start + 1])
+    for item in (plain, other):
+        item.release()
+
+
+EXTENT = 1.0, SIZE[1] / SIZE[0]
+
+
+def with_handles(recipe: Recipe, *handles: RecipeHandle, pins: tuple[RecipePin, ...] = ()) -> Recipe:
+    """A recipe with handles and pins, each of its own detail."""
+    made, held = ([with_detail(one, recipe, EXTENT) for one in several] for several in (handles, pins))
+    return recipe.edited(handle=tuple(made), pin=tuple(held))
+
+
+def test_a_handle_in_a_window_arrives_where_on_the_whole_picture_it_does_not(device: Device):
+    """A radius far on a coarse grid: within a pixel of 6000 in its window, some hundred short without."""
+    far = RecipeHandle(at=(0.3, 0.5), to=(0.35, 0.5), radius=0.05, duration=0.5)
+    pin = RecipePin(at=(0.3, 0.62), radius=0.05)
+    left = []
+    for recipe in (
+        with_handles(painted(cells=48), far, pins=(pin,)),
+        painted(cells=48).edited(handle=(far,), pin=(pin,)),
+    ):
+        replay = replayed(device, recipe.edited(duration=1.25))
+        replay.seek(replay.recipe.ticks)
+        assert (replay.window is None) == (not recipe.handle[0].detail)
+        left.append(replay.handles.away * 6000)
+        assert replay.warp.statistics().det_min > 0.2
+        replay.release()
+    assert left[0].max() < 1.0
+    assert left[1].max() > 50.0
+
+
+def test_what_is_at_rest_outside_the_window_stays_there(device: Device):
+    """A handle that has arrived, and pins, while a stroke and then another handle have the window elsewhere."""
+    first = RecipeHandle(at=(0.2, 0.3), to=(0.23, 0.3), radius=0.04, duration=0.2)
+    then = RecipeHandle(at=(0.8, 0.7), to=(0.8, 0.75), radius=0.04, start=0.9, duration=0.2)
+    pins = RecipePin(at=(0.2, 0.5), radius=0.04), RecipePin(at=(0.8, 0.4), radius=0.04)
+    push = Stroke(tool="push", radius=0.03, detail=455, samples=((40, 0.5, 0.3, 1.0), (50, 0.55, 0.3, 1.0)))
+    recipe = with_handles(painted(push, cells=48, ticks=100), first, then, pins=pins)
+    replay, windows, places = replayed(device, recipe, size=FINE), list[FlowWindow | None](), list[np.ndarray]()
+    for tick in range(recipe.ticks):
+        replay.advance()
+        if replay.window not in windows:
+            windows.append(replay.window)
+        if tick in (38, recipe.ticks - 1):
+            places.append(replay.handles.places)
+    assert len(windows) >= 3
+    assert None not in windows
+    assert replay.handles.away.max() * 6000 < 1.0
+    np.testing.assert_allclose(places[1][:3], places[0][:3], atol=1 / 6000)
+    assert replay.handles.halts == [None] * 4
+    replay.release()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_handles_in_windows_give_the_same_bytes_by_any_path(device: Device, seed: int):
+    """With strokes, masks, lines, turns and what is local among them; some on the whole picture, on any shape."""
+    rng = np.random.default_rng(seed)
+    size = [(600, 400), (400, 600), (900, 150), (300, 300)][seed]
+    extent = np.array(size) / max(size)
+    ticks, handles, pins, strokes = 48, [], [], []
+    for _ in range(int(rng.integers(2, 6))):
+        radius, at_ = float(rng.uniform(0.015, 0.05)), rng.uniform(0.1, 0.9, 2)
+        to = np.clip(at_ + rng.uniform(-1, 1, 2) * radius / extent, 0, 1)
+        more: dict[str, Any] = {"start": float(rng.choice([0.0, 0.2, 0.4])), "duration": 0.3}
+        if rng.random() < 0.3:
+            more |= {"rotate": 30.0, "scale": 1.2}
+        if rng.random() < 0.3:
+            more["points"] = [(at_ + part * radius / extent * [1, 0]).tolist() for part in (-1.0, 0.0, 1.0)]
+            more["points"] = tuple(map(tuple, np.clip(more["points"], 0, 1).tolist()))
+        if rng.random() < 0.4:
+            more["local"] = float(rng.choice([0.5, 1.0]))
+        if rng.random() < 0.3:
+            more["end"] = 0.6
+        handles.append(RecipeHandle(at=tuple(at_.tolist()), to=tuple(to.tolist()), radius=radius, **more))
+    for _ in range(int(rng.integers(0, 3))):
+        pins.append(RecipePin(at=tuple(rng.uniform(0, 1, 2).tolist()), radius=float(rng.uniform(0.02, 0.2))))
+    for first in range(0, 40, 12):
+        tool, radius = rng.choice(["push", "twirl", "bloat", "freeze", "thicken"]), float(rng.uniform(0.01, 0.05))
+        places = rng.uniform(0.1, 0.9, 2) + np.array([[0.0], [radius]])
+        samples = tuple((first + 3 * k, *place, 1.0) for k, place in enumerate(places.tolist()))
+        strokes.append(Stroke.model_validate({"tool": tool, "radius": radius, "detail": 455, "samples": samples}))
+    recipe = painted(*strokes, feel=[PUTTY, HONEY, WATER][seed % 3], cells=24, ticks=ticks)
+    given = ([with_detail(one, recipe, tuple(extent.tolist())) for one in each] for each in (handles, pins))
+    recipe = recipe.edited(**dict(zip(("handle", "pin"), map(tuple, given), strict=True)))
+    pictures = Pictures(Picture(np.zeros((size[1], size[0], 3), np.uint8)))
+    plain, other = (Replay(device, recipe, pictures, budget) for budget in (0, 2**28))
+    moments, windows = {}, set()
+    for tick in range(recipe.ticks + 1):
+        plain.seek(tick)
+        windows.add(plain.window)
+        moments[tick] = plain.snapshot()
+    assert windows != {None}
+    assert np.isfinite(plain.warp.read()).all()
+    assert plain.warp.statistics().folds == 0
+    for _ in range(4):
+        tick = int(rng.integers(recipe.ticks + 1))
+        other.seek(tick)
+        same(other.snapshot(), moments[tick])
+        assert len(other.handles.halts) == len(handles) + len(pins)  # looking changes nothing
+        other.use(recipe.edited(handle=recipe.handle[:1], stroke=recipe.stroke[: int(rng.integers(4))]))
         other.use(recipe)
         same(other.snapshot(), moments[tick])
         start = int(rng.integers(recipe.ticks))

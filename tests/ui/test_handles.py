@@ -58,7 +58,7 @@ def test_a_point_is_dragged_where_it_shall_go_and_stays_there(robot: Robot) -> N
     assert session.held[0].now == pytest.approx(handle.goal, abs=2 * ARRIVED)
 
 
-@pytest.mark.parametrize(("radius", "way"), [(0.06, 0.03), (0.1, 0.05)])
+@pytest.mark.parametrize(("radius", "way"), [(0.06, 0.09), (0.1, 0.15)])
 def test_nobody_says_that_one_is_on_its_way_where_time_stands_still(
     device: Device, tmp_path: Path, radius: float, way: float
 ) -> None:
