@@ -53,7 +53,7 @@ class Press:
         extent: (width, height) of the picture, the longer of them 1.
         dt: seconds a tick.
         last: where the last stroke ended, for a straight line from there.
-        detail: how finely the flow of such a brush is solved; see `app.model.windows`. `finely` gives handles theirs.
+        detail: how finely the flow of such a brush is solved; see `app.model.windows`.
         slack: how far the pointer may shake, in longer sides, and is not moved yet.
         string: by how long a string the pen pulls the brush, in longer sides; see `PulledString`.
         at: the place in the original of what was pressed on.
@@ -61,6 +61,7 @@ class Press:
         symmetry, sectors: of strokes.
         held: the handle that was taken hold of, and `rests`, where it is led.
         timeless: what is painted on masks takes no time.
+        finely: gives a handle its detail.
     """
 
     brush: BrushSettings
@@ -69,7 +70,6 @@ class Press:
     dt: float
     last: tuple[float, float] | None = None
     detail: int = 0
-    finely: Callable[[RecipeHandle], RecipeHandle] = copy
     slack: float = 0.0
     string: float = 0.0
     at: tuple[float, float] = (0.0, 0.0)
@@ -79,6 +79,7 @@ class Press:
     timeless: bool = False
     symmetry: Symmetry = "none"
     sectors: int = 6
+    finely: Callable[[RecipeHandle], RecipeHandle] = copy
 
 
 class PulledString:

@@ -1,9 +1,9 @@
-"""The flow's window: a stroke of a small brush is solved on fine cells around it, and not over the whole picture.
+"""The flow's window: what strokes of a small brush and handles do is solved on fine cells around them.
 
-A stroke says how fine (`Stroke.detail`): so many cells along the picture's longer side, were they all over it. Of that
-lattice a window holds `CELLS` x `CELLS`, or as many as there are, around the brush. It stays where it is as long as the
-brush has room in it, is dragged along otherwise, and outlives the stroke: what the fluid does then it does there.
-Everything follows from the strokes up to a tick, so that a recipe gives the same bytes whichever way it is replayed.
+They say how fine (`Stroke.detail`): so many cells along the picture's longer side, were they all over it. Of that
+lattice a window holds `CELLS` x `CELLS`, or as many as there are, around what moves. It stays where it is while that
+has room in it, is dragged along otherwise, and outlives it: what the fluid does then it does there. Everything follows
+from the recipe up to a tick, so that it gives the same bytes whichever way it is replayed.
 """
 
 from __future__ import annotations
@@ -143,10 +143,11 @@ class FlowWindow(NamedTuple):
             led: the handles and pins in force.
 
         Returns:
-            `now` if they have room there, or if all are at rest; what goes on also stays in one that is coarser than it
-            asked for, as a wide movement has needed it. None if one of them wants the whole picture, as a stroke with
-            images all over it does, or if no window with cells finer than those of `whole` has room for them. What is
-            at rest has room where it feels what moves, so that it can hold against that; elsewhere it needs none.
+            `now` if they have room there, or if all are at rest. Strokes that go on also stay in one coarser than
+            they asked for, as a wide movement has needed it, and handles unless a finer one has room to spare. None if
+            one of them wants the whole picture, as a stroke with images all over it does, or if no window with cells
+            finer than those of `whole` has room for them. What is at rest has room where it feels what moves, so that
+            it can hold against that; elsewhere it needs none.
         """
         moving = [each for each in led if each.is_moving]
         if not all(each.detail for each in led):
@@ -177,15 +178,19 @@ class FlowWindow(NamedTuple):
             if not each.is_moving and _are_within(each.here, moved):
                 _widen(room, each.here, each.push, whole.picture)
         goes_on = all(act.stroke.first_tick < act.tick for act in acts) and not any(each.begins for each in moving)
-        if now is not None and detail > now.detail and goes_on:
-            detail = now.detail
+        held, spare = finest if now is None else now.detail, 0.0
+        if detail > held and goes_on and acts and now is not None:
+            detail = held
+        elif goes_on and moving:  # to finer cells only where no next step takes it back to coarser ones
+            spare = AHEAD * max(each.reach for each in moving)
         while detail > finest:
             lattice = _lattice(detail, whole.picture)
             if min(lattice) < SMALLEST_GRID:
                 return None
             if now is not None and now.detail == detail and _holds(now, lattice, room, whole.picture):
                 return now
-            if found := _laid(lattice, room, ends, whole.picture):
+            wanted = _wider(room, spare, whole.picture) if detail > held else room
+            if found := _laid(lattice, wanted, ends, whole.picture):
                 return cls(detail, *found)
             detail = round(detail / STEP)
         return None
@@ -196,6 +201,12 @@ def _widen(room: list[float], places: np.ndarray, reach: float, picture: tuple[f
     places = np.clip(places, 0.0, picture)
     low, high = np.maximum(places.min(axis=0) - reach, 0.0), np.minimum(places.max(axis=0) + reach, picture)
     room[:] = *np.minimum(room[:2], low).tolist(), *np.maximum(room[2:], high).tolist()
+
+
+def _wider(room: list[float], reach: float, picture: tuple[float, float]) -> list[float]:
+    """A box with so much more around it in the picture."""
+    low, high = np.maximum(np.array(room[:2]) - reach, 0.0), np.minimum(np.array(room[2:]) + reach, picture)
+    return [*low.tolist(), *high.tolist()]
 
 
 def _are_within(places: np.ndarray, room: list[float]) -> bool:

@@ -163,13 +163,17 @@ def test_handles_too_far_apart_for_a_fine_window_have_a_coarser_one():
     near, far = led((0.1, 0.1), way=0.002), led((0.9, 0.6), way=0.002)
     window = FlowWindow.of([], None, Grid.for_picture(6000, 4000, 96), [near, far])
     assert window is not None
-    assert window.detail == CELLS
+    assert 96 < window.detail <= CELLS
     assert window.grid_in(WHOLE).is_whole
     assert FlowWindow.of([], None, WHOLE, [near, far]) is None
-    # One that sets out asks anew for as fine a window as it may have; one that goes on keeps the coarser one.
+    # Its own again as soon as the other has arrived; but one that goes on only takes what has room to spare.
     coarse = FlowWindow(384, 60, 0)
-    assert FlowWindow.of([], coarse, WHOLE, [led((0.4, 0.3), way=0.002)]) == coarse
-    anew = FlowWindow.of([], coarse, WHOLE, [led((0.4, 0.3), way=0.002, begins=True)])
+    back = FlowWindow.of([], coarse, WHOLE, [led((0.4, 0.3), way=0.002)])
+    assert back is not None
+    assert back.detail == 512
+    wide = [led((0.4, 0.3), (0.52, 0.3), way=0.002)]  # 6 radii and 3, of 9.4
+    assert FlowWindow.of([], coarse, WHOLE, wide) == coarse
+    anew = FlowWindow.of([], coarse, WHOLE, [led((0.4, 0.3), (0.52, 0.3), way=0.002, begins=True)])
     assert anew is not None
     assert anew.detail == 512
 
@@ -370,14 +374,12 @@ def with_handles(recipe: Recipe, *handles: RecipeHandle, pins: tuple[RecipePin, 
 
 def test_a_handle_in_a_window_arrives_where_on_the_whole_picture_it_does_not(device: Device):
     """A radius far on a coarse grid: within a pixel of 6000 in its window, some hundred short without."""
-    far = RecipeHandle(at=(0.3, 0.5), to=(0.35, 0.5), radius=0.05, duration=0.5)
-    pin = RecipePin(at=(0.3, 0.62), radius=0.05)
+    far = RecipeHandle(at=(0.4, 0.48), to=(0.44, 0.52), radius=0.05, duration=0.7)
+    pin = RecipePin(at=(0.4, 0.62), radius=0.05)
     left = []
-    for recipe in (
-        with_handles(painted(cells=48), far, pins=(pin,)),
-        painted(cells=48).edited(handle=(far,), pin=(pin,)),
-    ):
-        replay = replayed(device, recipe.edited(duration=1.25))
+    bare = painted(cells=96, ticks=90)
+    for recipe in (with_handles(bare, far, pins=(pin,)), bare.edited(handle=(far,), pin=(pin,))):
+        replay = replayed(device, recipe, size=FINE)
         replay.seek(replay.recipe.ticks)
         assert (replay.window is None) == (not recipe.handle[0].detail)
         left.append(replay.handles.away * 6000)
@@ -389,11 +391,11 @@ def test_a_handle_in_a_window_arrives_where_on_the_whole_picture_it_does_not(dev
 
 def test_what_is_at_rest_outside_the_window_stays_there(device: Device):
     """A handle that has arrived, and pins, while a stroke and then another handle have the window elsewhere."""
-    first = RecipeHandle(at=(0.2, 0.3), to=(0.23, 0.3), radius=0.04, duration=0.2)
-    then = RecipeHandle(at=(0.8, 0.7), to=(0.8, 0.75), radius=0.04, start=0.9, duration=0.2)
+    first = RecipeHandle(at=(0.2, 0.3), to=(0.22, 0.3), radius=0.04, duration=0.3)
+    then = RecipeHandle(at=(0.8, 0.7), to=(0.8, 0.74), radius=0.04, start=0.9, duration=0.4)
     pins = RecipePin(at=(0.2, 0.5), radius=0.04), RecipePin(at=(0.8, 0.4), radius=0.04)
     push = Stroke(tool="push", radius=0.03, detail=455, samples=((40, 0.5, 0.3, 1.0), (50, 0.55, 0.3, 1.0)))
-    recipe = with_handles(painted(push, cells=48, ticks=100), first, then, pins=pins)
+    recipe = with_handles(painted(push, cells=96, ticks=110), first, then, pins=pins)
     replay, windows, places = replayed(device, recipe, size=FINE), list[FlowWindow | None](), list[np.ndarray]()
     for tick in range(recipe.ticks):
         replay.advance()
