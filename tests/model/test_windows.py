@@ -17,6 +17,7 @@ from app.model.windows import CELLS, FlowWindow, Led, detail_for, detail_for_led
 from app.work.replay import Replay
 from solver.gl.device import Device
 from solver.grid import Grid
+from support.leading import arrangement
 
 WHOLE = Grid.for_picture(6000, 4000, 256)
 
@@ -472,3 +473,39 @@ def same(found: dict[str, np.ndarray], wanted: dict[str, np.ndarray]) -> None:
     assert found.keys() == wanted.keys()
     for name, array in wanted.items():
         np.testing.assert_array_equal(found[name], array, name)
+
+
+@pytest.mark.parametrize(
+    ("size", "count", "radius", "seed"),
+    [
+        ((3000, 2000), 1, 0.0917, 3),
+        ((3000, 2000), 4, 0.05, 4),
+        ((3000, 500), 4, 0.03, 0),
+        ((500, 3000), 16, 0.033, 5),
+        ((2000, 2000), 16, 0.05, 1),
+    ],
+)
+def test_random_handles_arrive_in_a_window(device: Device, size: tuple[int, int], count: int, radius: float, seed: int):
+    """An arrangement over five radii, at 96 cells: within a twentieth of a pixel of 512, at rest, no fold."""
+    points, targets, pins = arrangement(seed, count)
+    extent, side = np.array(size) / max(size), 5 * radius
+    corner = np.random.default_rng(seed).uniform(0, 1, 2) * np.maximum(extent - side, 0)
+    feel = [PUTTY, HONEY, WATER][seed % 3]
+    recipe = painted(feel=feel, cells=96, ticks=135)
+    places = [
+        [tuple(place) for place in ((corner + side * each) / extent).tolist()] for each in (points, targets, pins)
+    ]
+    handles = [RecipeHandle(at=at_, to=to, radius=radius, duration=1.5) for at_, to in zip(*places[:2], strict=True)]
+    held = [RecipePin(at=at_, radius=radius) for at_ in places[2]]
+    finely = (tuple(with_detail(one, recipe, tuple(extent.tolist())) for one in each) for each in (handles, held))
+    replay = replayed(device, recipe.edited(**dict(zip(("handle", "pin"), finely, strict=True))), size=size)
+    replay.seek(recipe.ticks - 15)
+    before = replay.handles.places
+    replay.seek(recipe.ticks)
+    assert replay.window is not None
+    assert replay.handles.away.max() * 512 < 0.05
+    assert np.hypot(*(replay.handles.places - before).T).max() * 512 / 0.25 < 0.1
+    found = replay.warp.statistics()
+    assert found.folds == 0
+    assert found.det_min > 0.2
+    replay.release()
