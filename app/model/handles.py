@@ -13,6 +13,7 @@ from pydantic import Field, model_validator
 
 from app.model.sampling import Point
 from app.model.schema import Fraction01, Model, Place, Several, label_of
+from app.model.strokes import FINEST_DETAIL
 from solver.course import SAME_TIME, Course
 from solver.limits import (
     LARGEST_LEAD,
@@ -65,6 +66,9 @@ class _Led(Model):
         radius: how far it reaches, in longer sides.
         start, end: seconds from and until which it is in force; without an end, for ever.
         stiffness: 1 holds exactly; less gives way to the fluid and to others.
+        detail: cells along the picture's longer side that the flow is solved with, in a window around it, while it is
+            on its way (see `app.model.windows`); at rest it needs none. 0: on the grid of the whole picture, as long as
+            it is in force.
     """
 
     name: str = ""
@@ -76,6 +80,7 @@ class _Led(Model):
     start: Time = 0.0
     end: Time | None = None
     stiffness: Annotated[float, Field(ge=LEAST_STIFFNESS, le=1)] = 1.0
+    detail: Annotated[int, Field(ge=0, le=FINEST_DETAIL)] = 0
 
     @model_validator(mode="before")
     @classmethod
@@ -329,6 +334,11 @@ def objections(
 def leads_too_far(led: RecipeHandle | RecipePin, extent: Point) -> bool:
     """True if its goal is farther than it goes."""
     return _Way("", led, extent).far > LARGEST_LEAD
+
+
+def reach_of(led: RecipeHandle | RecipePin, extent: Point) -> float:
+    """How far it reaches as a whole, in longer sides: its radius, or what its line needs."""
+    return _Way("", led, extent).reach
 
 
 class _Way:

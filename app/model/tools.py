@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterator
+from copy import copy
 from dataclasses import dataclass
 from itertools import pairwise
 from math import ceil, hypot
@@ -60,6 +61,7 @@ class Press:
         symmetry, sectors: of strokes.
         held: the handle that was taken hold of, and `rests`, where it is led.
         timeless: what is painted on masks takes no time.
+        finely: gives a handle its detail.
     """
 
     brush: BrushSettings
@@ -77,6 +79,7 @@ class Press:
     timeless: bool = False
     symmetry: Symmetry = "none"
     sectors: int = 6
+    finely: Callable[[RecipeHandle], RecipeHandle] = copy
 
 
 class PulledString:
@@ -330,7 +333,7 @@ def _held(press: Press, tick: int, **what: Any) -> RecipeHandle:
     """A handle that holds what was taken from a tick on, and has been led nowhere."""
     brush = press.brush
     parts = {"keys": (), "radius": brush.radius, "stiffness": brush.stiffness, "local": brush.local}
-    return RecipeHandle.model_validate({"start": tick * press.dt, **parts, **what})
+    return press.finely(RecipeHandle.model_validate({"start": tick * press.dt, **parts, **what}))
 
 
 TOOLS = (

@@ -10,8 +10,10 @@ from app.errors import UserError
 from app.media.project import Project
 from app.model.bars import Changed, Which, with_changed
 from app.model.edits import check_size, with_change, with_led
+from app.model.handles import RecipeHandle, RecipePin
 from app.model.mask_edits import MaskEdit
 from app.model.recipe import Recipe
+from app.model.windows import with_detail
 from app.work.handle_status import held_in
 from app.work.painting import Painting
 from solver.gl.device import Device
@@ -114,7 +116,12 @@ class Editing(Painting):
 
         `commit`: as an entry of the history; not while a slider is dragged.
         """
-        parts = with_led(self._live, label, lambda led: led.model_copy(update=settings))
+
+        def changed(led: RecipeHandle | RecipePin) -> RecipeHandle | RecipePin:
+            led = led.model_copy(update=settings)
+            return with_detail(led, self._live, self.extent) if "radius" in settings else led
+
+        parts = with_led(self._live, label, changed)
         last = max((handle.last for handle in parts["handle"] if handle.turns), default=0.0)
         if lasts := last > self._base.duration:
             parts["duration"] = (ceil(last / self.dt) + 1) * self.dt

@@ -33,6 +33,7 @@ from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.model.sampling import Point
 from app.model.schema import label_of
+from app.model.windows import with_detail
 from app.progress import Progress
 from app.work.loaded_handles import LoadedHandles
 from app.work.replay import Replay
@@ -604,7 +605,14 @@ class _Search:
             }
             handles[self._slots[row]] = lead.handle.model_copy(update=lead.course(part) | values_of)
         fluid = base.fluid.model_copy(update={"viscosity": values[-1]})
-        return base.edited(handle=tuple(handles.values()), fluid=fluid)
+        recipe = base.edited(handle=tuple(handles.values()), fluid=fluid)
+        if base is not self.fine.recipe:  # where windows would cost what the coarse grid saves
+            return recipe
+        extent = self.extent[0], self.extent[1]
+        for slot in self._slots:
+            if not self.aim.own or handles[slot].detail:
+                handles[slot] = with_detail(handles[slot], recipe, extent)
+        return recipe.edited(handle=tuple(handles.values()))
 
     @property
     def _slots(self) -> list[int]:
@@ -682,7 +690,7 @@ class _Search:
         if any(edit.tick > 0 for edit in recipe.mask):
             return np.array(self.numbers, int)
         replay = Replay(self.device, recipe, self.fine.pictures, budget=0)
-        solid, (nx, ny) = replay.fluid.solid.get() == 255, replay.grid.size
+        solid, (nx, ny) = replay.solid, replay.grid.size
         replay.release()
         cells = np.arange(nx * ny).reshape(ny, nx)
         across, down = ~solid[:, :-1] & ~solid[:, 1:], ~solid[:-1] & ~solid[1:]
@@ -712,16 +720,21 @@ def _coarse(recipe: Recipe) -> Recipe:
     settings = recipe.fluid.model_copy(update={"grid": min(recipe.fluid.grid, COARSE_GRID)})
     if not (recipe.stroke or recipe.change or recipe.mask):  # which are told in ticks
         settings = settings.model_copy(update={"dt": max(settings.dt, min(COARSE_DT, recipe.duration / 24))})
-    return recipe.edited(fluid=settings)
+    handles, pins = (
+        tuple(led.model_copy(update={"detail": 0}) for led in each) for each in (recipe.handle, recipe.pin)
+    )
+    return recipe.edited(fluid=settings, handle=handles, pin=pins)
 
 
 def _strain(replay: Replay) -> float:
     """The root mean square of grad u at this moment, of what carries the picture."""
-    faces, (hx, hy) = replay.fluid.carrier().get().astype(np.float64), replay.fluid.grid.spacing
+    grid, (width, height) = replay.fluid.grid, replay.grid.extent
+    faces, (hx, hy) = replay.fluid.carrier().get().astype(np.float64), grid.spacing
     faces = np.pad(faces, ((0, 1), (0, 1), (0, 0)))  # the far walls
     velocity = np.stack([faces[:-1, :-1, 0] + faces[:-1, 1:, 0], faces[:-1, :-1, 1] + faces[1:, :-1, 1]], axis=-1) / 2
     slopes = np.gradient(velocity, hx, axis=1), np.gradient(velocity, hy, axis=0)
-    return float(np.sqrt(sum((slope**2).sum(axis=-1).mean() for slope in slopes)))
+    part = 1.0 if grid.is_whole else grid.extent[0] * grid.extent[1] / (width * height)  # the rest is at rest
+    return float(np.sqrt(part * sum((slope**2).sum(axis=-1).mean() for slope in slopes)))
 
 
 def _is_fitted(handle: RecipeHandle) -> int:

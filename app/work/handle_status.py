@@ -140,7 +140,7 @@ def unmet(replay: Replay, within: float, is_fitted: bool = False) -> Iterator[Un
     """
     if not replay.handles.handles:
         return
-    solid = replay.fluid.solid.get() == 255
+    solid = replay.solid
     for (label, led), far, points, halt in zip(
         replay.led, replay.handles.away, replay.handles.shapes, replay.handles.halts, strict=True
     ):

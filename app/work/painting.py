@@ -15,7 +15,7 @@ from app.model.mask_edits import MaskEdit, MaskStroke, with_edit
 from app.model.sampling import Point
 from app.model.strokes import Stroke
 from app.model.tools import Press, Tool, Touch
-from app.model.windows import detail_for
+from app.model.windows import detail_for, with_detail
 from app.work.gesture import OpenGesture, kept_near
 from app.work.handle_status import Held
 from app.work.recording import Recording
@@ -72,7 +72,8 @@ class Painting(Recording):
             press = replace(press, held=self._base.handle[taken], rests=held.target)
         self._target = None
         detail = detail_for(press.brush.radius, self._base, self._base.fluid_at(pen))
-        press = replace(press, last=self.last_place, detail=detail)
+        base, extent = self._base, self.extent
+        press = replace(press, last=self.last_place, detail=detail, finely=lambda led: with_detail(led, base, extent))
         touch = Touch(pen, *kept_near(x, y), pressure, shift)
         self._gesture = OpenGesture(tool, press, touch, self.extent, taken, idles_at)
         self.replay.checkpoint()

@@ -22,7 +22,7 @@ from app.model.masks import solid, viscosity
 from app.model.recipe import FluidSettings, Recipe
 from app.model.sampling import FINEST, SmallPictures, channels
 from app.model.strokes import FINEST_DETAIL, Act, Change
-from app.model.windows import FLOWING, FlowWindow, may_have_windows
+from app.model.windows import FLOWING, FlowWindow, Led, may_have_windows
 from app.work.brushwork import Brushwork, Scene
 from app.work.checkpoints import DEFAULT_BUDGET, Checkpoint, Checkpoints, Moment
 from app.work.loaded_forces import LoadedForce, acting
@@ -43,6 +43,9 @@ from solver.warp.map import WarpMap
 from solver.warp.scaled import ScaledMap
 
 CHECKPOINT_EVERY = 16  # ticks
+
+# What wants the whole picture.
+WHOLE = Led(0, 1.0, 1.0, np.zeros((1, 2)), np.zeros((1, 2)), is_moving=True, begins=False)
 
 SOLVERS = {"mac": (Fluid, WarpMap), "paper": (PaperFluid, PaperWarpMap)}
 
@@ -241,6 +244,16 @@ class Replay:
             self._led_of, self._led = recipe, sorted(led, key=lambda each: isinstance(each[1], RecipeHandle))
         return self._led
 
+    @property
+    def solid(self) -> np.ndarray:
+        """The cells of the whole picture that are wholly closed, (ny, nx); reads back from the GPU."""
+        if self.window is None:
+            return self.fluid.solid.get() == 255
+        x, y = self.grid.centres()
+        frozen = self.masks.frozen.get() >= 128  # from a half on
+        (rows, columns), (width, height) = frozen.shape, self.grid.extent
+        return frozen[(y / height * rows).astype(int), (x / width * columns).astype(int)]
+
     def as_seen(self, values: np.ndarray, grid: Grid) -> np.ndarray:
         """Values of the original's cells, (ny, nx) or (ny, nx, c), where the warp shows them at this moment."""
         if self.tick == 0 and self.recipe.map is None:
@@ -324,12 +337,9 @@ class Replay:
             self._apply_masks()
 
     def _follow(self, acts: list[Act], leads: bool) -> None:
-        """Let the flow be solved where the strokes of this tick want it; without any it stays where it is.
-
-        Handles act on the whole picture.
-        """
+        """Let the flow be solved where strokes and handles of this tick want it; without any it stays where it is."""
         if (acts or leads) and self._has_windows:
-            window = None if leads else FlowWindow.of(acts, self.window, self.grid)
+            window = FlowWindow.of(acts, self.window, self.grid, self._ways() if leads else [])
             if window != self.window:
                 assert isinstance(self.fluid, Fluid)
                 with self.device.stage("window"):
@@ -341,6 +351,16 @@ class Replay:
                     self._apply_masks()
                     self.fluid.go_on_with(flow)
                     flow.release()
+
+    def _ways(self) -> list[Led]:
+        """The handles and pins that are in force in this tick."""
+        if not all(led.detail for _, led in self.led if led.is_in_force(self.tick, self.recipe.fluid.dt)):
+            return [WHOLE]
+        dt, found = self.recipe.fluid.dt, list[Led]()
+        for number, here, then, is_moving, begins in self.handles.ways(self.tick * dt, dt):
+            (_, led), handle = self.led[number], self.handles.handles[number]
+            found.append(Led(led.detail, handle.reach, handle.push_radius, here, then, is_moving, begins))
+        return found
 
     def _cells_of(self, window: FlowWindow | None) -> Grid:
         return self.grid if window is None else window.grid_in(self.grid)
@@ -360,6 +380,7 @@ class Replay:
             self.fluid = self._in_window
         if isinstance(self.fluid, Fluid):
             self.fluid.lay_on(grid)
+        self.handles.go_on_with(self.fluid)
         self.masks.forget_fluid()
 
     def _use_viscosity(self, base: float) -> None:

@@ -21,7 +21,7 @@ from solver.brush.listed import draw_listed
 from solver.brush.pushes import Pushes
 from solver.brush.tip import SMALLEST, Tip
 from solver.faces import Forces
-from solver.gl.field import Field
+from solver.gl.field import Field, FieldPool
 from solver.limits import LEAST_STIFFNESS, check_step, check_type
 from solver.scheme import Scheme
 from solver.state import State
@@ -73,6 +73,24 @@ class Ring(NamedTuple):
     def length(self) -> float:
         """Of its arms in the mean."""
         return float(np.hypot(*self.arms.T).mean())
+
+
+class Way(NamedTuple):
+    """Where the points of a handle in force are led in a step.
+
+    Attributes:
+        number: the handle's.
+        here, then: where they are, and shall be a step later, (k, 2) in longer sides.
+        is_moving: it is not at rest where it shall be: it is led on, or more than a texel of the map away, unless it
+            has let go.
+        begins: it sets out, from rest, in this step.
+    """
+
+    number: int
+    here: np.ndarray
+    then: np.ndarray
+    is_moving: bool
+    begins: bool
 
 
 class Targets(NamedTuple):
@@ -130,7 +148,7 @@ class Handles:
     Where they are is found in every step by inverting the map, so that no error adds up.
 
     Args:
-        fluid: what they move.
+        fluid: what they move, on the whole picture; it may go on in a window of it, by `go_on_with`.
         warp: the map of the picture that the fluid carries.
         handles: their number is that in the list, from 0.
     """
@@ -139,7 +157,8 @@ class Handles:
         check_type("what handles move", fluid, Scheme)
         check_type("what handles look at", warp, WarpMap)
         self._fluid, self._warp, self._forward = fluid, warp, ForwardMap(warp)
-        self._stream = fluid.device.field((fluid.grid.nx + 1, fluid.grid.ny + 1), 1, "stream function of handles")
+        self._cell = max(fluid.grid.spacing)
+        self._fields = FieldPool(fluid.device, "handles")
         self._at_rest = fluid.device.field((1, 1), 4, "no motion")
         self._brush, self._strain, self._distance = Brush(fluid.device), Strain(warp), Distance(fluid.device)
         self._expected = Expected(warp)
@@ -159,7 +178,7 @@ class Handles:
         for handle in handles:
             check_type("a handle", handle, Handle)
         known = {id(shape.handle): shape for shape in self._shapes}
-        self.handles, cell = handles, max(self._fluid.grid.spacing)
+        self.handles, cell = handles, self._cell
         self._shapes = [known.get(id(handle)) or Shape.of(handle, self._warp.extent, cell) for handle in handles]
         before, self._counts = self._counts, np.array([len(shape.led) for shape in self._shapes], int)
         self._rows = _runs(self._counts)
@@ -172,6 +191,10 @@ class Handles:
         self._soft = 1 / self._stiffness - 1 + ridges
         self._places, self._starts = (self._fitted(kept, before) for kept in (self._places, self._starts))
         self._progress = self._fitted_progress(self._progress)
+
+    def go_on_with(self, fluid: Scheme) -> None:
+        """From now on, move another fluid of the same picture: what lies outside its window stays by itself."""
+        self._fluid = fluid
 
     # -- a step -----------------------------------------------------------------------------------------------------
 
@@ -191,13 +214,13 @@ class Handles:
         """Before a step at a time: find where the handles are and shall go, and add what the fluid lacks of that."""
         if (dt := check_step(dt)) < NO_TIME:
             raise ValueError("to lead a handle takes some time")
-        shapes, self._lead = self._shapes, None
-        begun = np.array([each.is_in_picture and each.handle.start <= time + dt / 2 for each in shapes], bool)
-        in_force = begun & np.array([time + dt / 2 < handle.end for handle in self.handles], bool)
+        self._lead = None
+        begun, in_force = self._in_force(time, dt)
         self._places = self._located()
         if (new := np.repeat(begun, self._counts) & np.isnan(self._starts[:, 0])).any():
             self._places[new] = self._at[new] + self._forward.at(self._at[new])
             self._starts[new] = self._places[new]
+        in_force &= self._have_room()
         active, listed = np.flatnonzero(in_force).tolist(), np.flatnonzero(np.repeat(in_force, self._counts))
         if not active:
             return
@@ -209,7 +232,7 @@ class Handles:
         rings, loops, swelling_tips, pushed = self._areas(active, targets)
         local_parts = self._local[listed][pushed]
         side = min(self._fluid.grid.picture)
-        wide = np.maximum(np.minimum(WIDE * radii, side), radii)
+        wide = np.maximum(np.minimum(np.minimum(WIDE * radii, side), self._room(places)), radii)
         numbers = np.repeat(np.arange(len(rows)), counts)
         is_led, is_away = targets.is_led[numbers], self._are_away(targets)[numbers]
         beside = _beside(places, radii, numbers, is_led)[pushed]
@@ -262,6 +285,27 @@ class Handles:
             places, radii, pushed, pushes, looked_at, drawn, rings, loops, balance, wanted, carried
         )
         self._fluid.impulse.add(lambda faces: self._push(lead, faces, lead.wanted))
+
+    def ways(self, time: float, dt: float) -> list[Way]:
+        """Before a step at a time, of all that are in force in it; changes nothing."""
+        begun, in_force = self._in_force(time, dt)
+        if not in_force.any():
+            return []
+        places, starts, near = self._located(), self._starts.copy(), 1 / max(self._warp.size)
+        if (new := np.repeat(begun, self._counts) & np.isnan(starts[:, 0])).any():
+            starts[new] = places[new] = self._at[new] + self._forward.at(self._at[new])
+        has_ended = any(abs(handle.last - time) <= dt / 2 for handle in self.handles)
+        found = list[Way]()
+        for number in np.flatnonzero(in_force).tolist():
+            shape, rows = self._shapes[number], self._rows[number]
+            here, start = places[rows], starts[rows]
+            before, now, then = (shape.wanted(start, at, dt) for at in (time - dt, time, time + dt))
+            is_led, was_led = (np.abs(one - other).max() > FOUND * dt for one, other in ((then, now), (now, before)))
+            waits = self._progress[number, 1] <= PATIENCE or has_ended
+            is_away = waits and float(np.hypot(*(then - here).T).max()) > near
+            is_begun = not (was_led and np.isfinite(self._starts[rows]).all())
+            found.append(Way(number, here, then, bool(is_led or is_away), bool(is_led and is_begun)))
+        return found
 
     def make_up(self, velocity: Field) -> None:
         """After viscosity, before the projection: add to a velocity on MAC faces what is still lacking.
@@ -334,10 +378,12 @@ class Handles:
         found = list[str | None]()
         if not self._shapes:
             return found
-        expected = self._expected.field
-        slower = self._slower(
-            self._strain.around(self._located_or_waiting(), self._radii, expected), np.arange(len(self._at))
-        )
+        slower, places = np.ones(len(self._at)), self._located_or_waiting()
+        in_window = np.repeat(self._have_room(), self._counts)
+        for rows, coarsely in ((in_window, False), (~in_window, True)):
+            if rows.any():
+                strain = self._strain.around(places[rows], self._radii[rows], self._expected.field, coarsely)
+                slower[rows] = self._slower(strain, np.flatnonzero(rows))
         near, time, lefts = 1 / max(self._warp.size), self._fluid.time, self.left(math.inf, 1.0)
         for shape, rows, (_, waited), (_, left) in zip(self._shapes, self._rows, self._progress, lefts, strict=True):
             starts = self._starts[rows]
@@ -404,7 +450,7 @@ class Handles:
     def release(self) -> None:
         """Free the textures."""
         for thing in (
-            self._stream,
+            self._fields,
             self._at_rest,
             self._forward,
             self._brush,
@@ -432,6 +478,25 @@ class Handles:
         found = np.tile([np.inf, 0.0], (len(self.handles), 1))
         found[: len(kept)] = kept[: len(found)]
         return found
+
+    def _in_force(self, time: float, dt: float) -> tuple[np.ndarray, np.ndarray]:
+        """Which handles have begun in a step at a time, and which of them lead or hold in it, (h,) each."""
+        begun = [each.is_in_picture and each.handle.start <= time + dt / 2 for each in self._shapes]
+        held = [time + dt / 2 < handle.end for handle in self.handles]
+        return np.array(begun, bool), np.array(begun, bool) & np.array(held, bool)
+
+    def _room(self, places: np.ndarray) -> np.ndarray:
+        """How far places (n, 2) are from the sides of the fluid's window within the picture; negative outside."""
+        grid = self._fluid.grid
+        low, high = places - grid.origin, np.add(grid.origin, grid.extent) - places
+        apart = np.stack([low[:, 0], high[:, 0], low[:, 1], high[:, 1]], axis=-1)
+        return np.where(grid.at_edge, np.inf, apart).min(axis=1)
+
+    def _have_room(self) -> np.ndarray:
+        """The handles, (h,), whose pushes all lie in the fluid's window: nothing else in it is led."""
+        if self._fluid.grid.is_whole or not self._shapes:
+            return np.ones(len(self._shapes), bool)
+        return _of_each(np.minimum, self._room(self._places) - self._radii, self._rows) >= 0
 
     def _located(self) -> np.ndarray:
         """Where the handles that have begun are: x with x + D(x) = at, by Newton's method from where they should be."""
@@ -619,10 +684,11 @@ class Handles:
         forces, spins = strengths[:count].reshape(-1, 2), strengths[count:]
         for ring, spin in zip(lead.rings, spins.tolist(), strict=True):
             self._spin(ring, spin, faces)
-        self._stream.clear()
+        psi = self._fields.get("stream function", (grid.nx + 1, grid.ny + 1), 1)
+        psi.clear()
         stream = self._fluid.device.pass_("brush/handle_stream.frag")
-        lead.pushes.draw(self._fluid.device, stream, self._stream, forces)
-        self._fluid.device.pass_("brush/curl.frag")(faces, add=True, stream=self._stream, spacing=grid.spacing)
+        lead.pushes.draw(self._fluid.device, stream, psi, forces)
+        self._fluid.device.pass_("brush/curl.frag")(faces, add=True, stream=psi, spacing=grid.spacing)
 
 
 def _beside(places: np.ndarray, radii: np.ndarray, handles: np.ndarray, led: np.ndarray) -> np.ndarray:

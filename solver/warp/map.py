@@ -484,10 +484,17 @@ class WarpMap:
         shader, defines = "warp/strain.frag", self._held_defines()
         return drawn_at(self.device, places(points), self.extent, shader, defines, components=4, **self._parts())
 
-    def draw_strain(self, target: Field, region: Region) -> None:
-        """Draw the same into a region of a field that is laid over the picture."""
+    def draw_strain(
+        self,
+        target: Field,
+        region: Region,
+        corner: tuple[int, int] = (0, 0),
+        count: tuple[int, int] | None = None,
+    ) -> None:
+        """Draw the same into a region of a field over the picture, or over a lattice of `count` from `corner` on."""
         strain = self.device.pass_("warp/strain.frag", **self._held_defines())
-        strain(target, region=region, **self._parts(), origin=(0.0, 0.0), step=target.texel)
+        across, down = count or target.size
+        strain(target, region=region, **self._parts(), origin=corner, step=(1 / across, 1 / down))
 
     def draw(
         self,

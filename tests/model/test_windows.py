@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from app.media.auxiliary import Pictures
+from app.model.handles import RecipeHandle, RecipePin
 from app.model.picture import Picture
 from app.model.presets import HONEY, PUTTY, WATER, Feel
 from app.model.recipe import FluidSettings, Recipe
 from app.model.strokes import Act, Dab, Stroke
-from app.model.windows import CELLS, FlowWindow, detail_for
+from app.model.windows import CELLS, FlowWindow, Led, detail_for, detail_for_led, with_detail
 from app.work.replay import Replay
 from solver.gl.device import Device
 from solver.grid import Grid
+from support.leading import arrangement
 
 WHOLE = Grid.for_picture(6000, 4000, 256)
 
@@ -109,13 +113,86 @@ def test_a_window_lies_in_any_picture(size: tuple[int, int], place: tuple[float,
             assert window.detail <= detail
 
 
+# -- of handles -------------------------------------------------------------------------------------------------------
+
+
+def led(*places: tuple[float, float], detail: int = 512, way: float = 0.0, begins: bool = False, **more: Any) -> Led:
+    """A handle of radius .04 at places in longer sides, which moves so far to the right in a tick, or rests."""
+    here, given = np.array(places), {"reach": 0.04, "push": 0.04} | more
+    there = here + np.array([way, 0.0])
+    return Led(detail=detail, here=here, then=there, is_moving=way > 0, begins=begins, **given)
+
+
+@pytest.mark.parametrize("feel", [PUTTY, HONEY, WATER])
+@pytest.mark.parametrize("radius", [0.001, 0.01, 0.05, 0.09])
+def test_a_handle_has_18_to_24_cells_a_radius(feel: Feel, radius: float):
+    recipe = Recipe(fluid=FluidSettings(viscosity=feel.viscosity, drag=feel.drag, grid=96))
+    detail = detail_for_led(radius, recipe, recipe.fluid)
+    assert 18 - 1e-1 <= detail * radius <= 24 + 1e-1
+
+
+def test_a_handle_that_needs_no_window_does_not_keep_others_from_theirs():
+    recipe = Recipe(fluid=FluidSettings(viscosity=HONEY.viscosity, drag=HONEY.drag, grid=96))
+    assert 0 < detail_for_led(0.4, recipe, recipe.fluid) <= 96
+    # What flows on and on has cells as small as the whole picture may have.
+    assert detail_for_led(0.01, recipe, FluidSettings(viscosity=1e-7, grid=96)) == CELLS
+    for other in ({"mode": "density"}, {"fluid": FluidSettings(solver="paper")}):
+        assert detail_for_led(0.01, recipe.edited(**other), recipe.fluid) == 0
+
+
+def test_handles_that_move_have_room_and_what_is_at_rest_elsewhere_needs_none():
+    far = led((0.05, 0.6))
+    window = FlowWindow.of([], None, WHOLE, [led((0.7, 0.3), way=0.002), far])
+    assert window is not None
+    assert window.detail == 512
+    (left, top), (width, height) = window.grid_in(WHOLE).origin, window.grid_in(WHOLE).extent
+    assert left <= 0.7 - 3 * 0.04
+    assert left + width >= 0.702 + 3 * 0.04
+    assert top <= 0.3 - 3 * 0.04
+    assert top + height >= 0.3 + 3 * 0.04
+    # At rest, all stay in it; and where they hold against a stroke elsewhere, it has room for both.
+    assert FlowWindow.of([], window, WHOLE, [led((0.7, 0.3)), far]) == window
+    beside = FlowWindow.of([Act(stroke(0.02, detail=682), 0, at(0.1, 0.9, 0.1, 0.9))], window, WHOLE, [far])
+    assert beside is not None
+    assert beside.detail == 682
+    grid = beside.grid_in(WHOLE)
+    assert grid.origin[0] <= 0.05 - 0.04 or grid.at_edge[0]
+    assert grid.origin[1] <= 0.6 - 0.04
+
+
+def test_handles_too_far_apart_for_a_fine_window_have_a_coarser_one():
+    near, far = led((0.1, 0.1), way=0.002), led((0.9, 0.6), way=0.002)
+    window = FlowWindow.of([], None, Grid.for_picture(6000, 4000, 96), [near, far])
+    assert window is not None
+    assert 96 < window.detail <= CELLS
+    assert window.grid_in(WHOLE).is_whole
+    assert FlowWindow.of([], None, WHOLE, [near, far]) is None
+    # Its own again as soon as the other has arrived; but one that goes on only takes what has room to spare.
+    coarse = FlowWindow(384, 60, 0)
+    back = FlowWindow.of([], coarse, WHOLE, [led((0.4, 0.3), way=0.002)])
+    assert back is not None
+    assert back.detail == 512
+    wide = [led((0.4, 0.3), (0.52, 0.3), way=0.002)]  # 6 radii and 3, of 9.4
+    assert FlowWindow.of([], coarse, WHOLE, wide) == coarse
+    anew = FlowWindow.of([], coarse, WHOLE, [led((0.4, 0.3), (0.52, 0.3), way=0.002, begins=True)])
+    assert anew is not None
+    assert anew.detail == 512
+
+
+def test_one_handle_on_the_whole_picture_has_all_there():
+    here = led((0.5, 0.3), way=0.002)
+    assert FlowWindow.of([], FlowWindow(512, 100, 30), WHOLE, [here, led((0.1, 0.1), detail=0)]) is None
+    assert FlowWindow.of([Act(stroke(), 0, at(0.5, 0.5, 0.5, 0.5))], None, WHOLE, [led((0.1, 0.1), detail=0)]) is None
+
+
 # -- replayed ---------------------------------------------------------------------------------------------------------
 
 SIZE = 900, 600
+FINE = 3000, 2000  # six texels a cell of a window and more
 
 
-def replayed(device: Device, recipe: Recipe, budget: int = 0) -> Replay:
-    return Replay(device, recipe, Pictures(Picture(np.zeros((SIZE[1], SIZE[0], 3), np.uint8))), budget)
+def replayed(device: Device, recipe: Recipe, budget: int = 0, size: tuple[int, int] = SIZE) -> Replay:
+    return Replay(device, recipe, Pictures(Picture(np.zeros((size[1], size[0], 3), np.uint8))), budget)
 
 
 def painted(*strokes: Stroke, feel: Feel = PUTTY, cells: int = 64, ticks: int = 60) -> Recipe:
@@ -287,7 +364,148 @@ def test_any_strokes_in_windows_give_the_same_bytes_by_any_path(device: Device, 
         item.release()
 
 
+EXTENT = 1.0, SIZE[1] / SIZE[0]
+
+
+def with_handles(recipe: Recipe, *handles: RecipeHandle, pins: tuple[RecipePin, ...] = ()) -> Recipe:
+    """A recipe with handles and pins, each of its own detail."""
+    made, held = ([with_detail(one, recipe, EXTENT) for one in several] for several in (handles, pins))
+    return recipe.edited(handle=tuple(made), pin=tuple(held))
+
+
+def test_a_handle_in_a_window_arrives_where_on_the_whole_picture_it_does_not(device: Device):
+    """A radius far on a coarse grid: within a pixel of 6000 in its window, some hundred short without."""
+    far = RecipeHandle(at=(0.4, 0.48), to=(0.44, 0.52), radius=0.05, duration=0.7)
+    pin = RecipePin(at=(0.4, 0.62), radius=0.05)
+    left = []
+    bare = painted(cells=96, ticks=90)
+    for recipe in (with_handles(bare, far, pins=(pin,)), bare.edited(handle=(far,), pin=(pin,))):
+        replay = replayed(device, recipe, size=FINE)
+        replay.seek(replay.recipe.ticks)
+        assert (replay.window is None) == (not recipe.handle[0].detail)
+        left.append(replay.handles.away * 6000)
+        assert replay.warp.statistics().det_min > 0.2
+        replay.release()
+    assert left[0].max() < 1.0
+    assert left[1].max() > 50.0
+
+
+def test_what_is_at_rest_outside_the_window_stays_there(device: Device):
+    """A handle that has arrived, and pins, while a stroke and then another handle have the window elsewhere."""
+    first = RecipeHandle(at=(0.2, 0.3), to=(0.22, 0.3), radius=0.04, duration=0.3)
+    then = RecipeHandle(at=(0.8, 0.7), to=(0.8, 0.74), radius=0.04, start=0.9, duration=0.4)
+    pins = RecipePin(at=(0.2, 0.5), radius=0.04), RecipePin(at=(0.8, 0.4), radius=0.04)
+    push = Stroke(tool="push", radius=0.03, detail=455, samples=((40, 0.5, 0.3, 1.0), (50, 0.55, 0.3, 1.0)))
+    recipe = with_handles(painted(push, cells=96, ticks=110), first, then, pins=pins)
+    replay, windows, places = replayed(device, recipe, size=FINE), list[FlowWindow | None](), list[np.ndarray]()
+    for tick in range(recipe.ticks):
+        replay.advance()
+        if replay.window not in windows:
+            windows.append(replay.window)
+        if tick in (38, recipe.ticks - 1):
+            places.append(replay.handles.places)
+    assert len(windows) >= 3
+    assert None not in windows
+    assert replay.handles.away.max() * 6000 < 1.0
+    np.testing.assert_allclose(places[1][:3], places[0][:3], atol=1 / 6000)
+    assert replay.handles.halts == [None] * 4
+    replay.release()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_handles_in_windows_give_the_same_bytes_by_any_path(device: Device, seed: int):
+    """With strokes, masks, lines, turns and what is local among them; some on the whole picture, on any shape."""
+    rng = np.random.default_rng(seed)
+    size = [(600, 400), (400, 600), (900, 150), (300, 300)][seed]
+    extent = np.array(size) / max(size)
+    ticks, handles, pins, strokes = 48, [], [], []
+    for _ in range(int(rng.integers(2, 6))):
+        radius, at_ = float(rng.uniform(0.015, 0.05)), rng.uniform(0.1, 0.9, 2)
+        to = np.clip(at_ + rng.uniform(-1, 1, 2) * radius / extent, 0, 1)
+        more: dict[str, Any] = {"start": float(rng.choice([0.0, 0.2, 0.4])), "duration": 0.3}
+        if rng.random() < 0.3:
+            more |= {"rotate": 30.0, "scale": 1.2}
+        if rng.random() < 0.3:
+            more["points"] = [(at_ + part * radius / extent * [1, 0]).tolist() for part in (-1.0, 0.0, 1.0)]
+            more["points"] = tuple(map(tuple, np.clip(more["points"], 0, 1).tolist()))
+        if rng.random() < 0.4:
+            more["local"] = float(rng.choice([0.5, 1.0]))
+        if rng.random() < 0.3:
+            more["end"] = 0.6
+        handles.append(RecipeHandle(at=tuple(at_.tolist()), to=tuple(to.tolist()), radius=radius, **more))
+    for _ in range(int(rng.integers(0, 3))):
+        pins.append(RecipePin(at=tuple(rng.uniform(0, 1, 2).tolist()), radius=float(rng.uniform(0.02, 0.2))))
+    for first in range(0, 40, 12):
+        tool, radius = rng.choice(["push", "twirl", "bloat", "freeze", "thicken"]), float(rng.uniform(0.01, 0.05))
+        places = rng.uniform(0.1, 0.9, 2) + np.array([[0.0], [radius]])
+        samples = tuple((first + 3 * k, *place, 1.0) for k, place in enumerate(places.tolist()))
+        strokes.append(Stroke.model_validate({"tool": tool, "radius": radius, "detail": 455, "samples": samples}))
+    recipe = painted(*strokes, feel=[PUTTY, HONEY, WATER][seed % 3], cells=24, ticks=ticks)
+    given = ([with_detail(one, recipe, tuple(extent.tolist())) for one in each] for each in (handles, pins))
+    recipe = recipe.edited(**dict(zip(("handle", "pin"), map(tuple, given), strict=True)))
+    pictures = Pictures(Picture(np.zeros((size[1], size[0], 3), np.uint8)))
+    plain, other = (Replay(device, recipe, pictures, budget) for budget in (0, 2**28))
+    moments, windows = {}, set()
+    for tick in range(recipe.ticks + 1):
+        plain.seek(tick)
+        windows.add(plain.window)
+        moments[tick] = plain.snapshot()
+    assert windows != {None}
+    assert np.isfinite(plain.warp.read()).all()
+    assert plain.warp.statistics().folds == 0
+    for _ in range(4):
+        tick = int(rng.integers(recipe.ticks + 1))
+        other.seek(tick)
+        same(other.snapshot(), moments[tick])
+        assert len(other.handles.halts) == len(handles) + len(pins)  # looking changes nothing
+        other.use(recipe.edited(handle=recipe.handle[:1], stroke=recipe.stroke[: int(rng.integers(4))]))
+        other.use(recipe)
+        same(other.snapshot(), moments[tick])
+        start = int(rng.integers(recipe.ticks))
+        other.resume(start, moments[start])
+        other.advance()
+        same(other.snapshot(), moments[start + 1])
+    for item in (plain, other):
+        item.release()
+
+
 def same(found: dict[str, np.ndarray], wanted: dict[str, np.ndarray]) -> None:
     assert found.keys() == wanted.keys()
     for name, array in wanted.items():
         np.testing.assert_array_equal(found[name], array, name)
+
+
+@pytest.mark.parametrize(
+    ("size", "count", "radius", "seed"),
+    [
+        ((3000, 2000), 1, 0.0917, 3),
+        ((3000, 2000), 4, 0.05, 4),
+        ((3000, 500), 4, 0.03, 0),
+        ((500, 3000), 16, 0.033, 5),
+        ((2000, 2000), 16, 0.05, 1),
+    ],
+)
+def test_random_handles_arrive_in_a_window(device: Device, size: tuple[int, int], count: int, radius: float, seed: int):
+    """An arrangement over five radii, at 96 cells: within a twentieth of a pixel of 512, at rest, no fold."""
+    points, targets, pins = arrangement(seed, count)
+    extent, side = np.array(size) / max(size), 5 * radius
+    corner = np.random.default_rng(seed).uniform(0, 1, 2) * np.maximum(extent - side, 0)
+    feel = [PUTTY, HONEY, WATER][seed % 3]
+    recipe = painted(feel=feel, cells=96, ticks=135)
+    places = [
+        [tuple(place) for place in ((corner + side * each) / extent).tolist()] for each in (points, targets, pins)
+    ]
+    handles = [RecipeHandle(at=at_, to=to, radius=radius, duration=1.5) for at_, to in zip(*places[:2], strict=True)]
+    held = [RecipePin(at=at_, radius=radius) for at_ in places[2]]
+    finely = (tuple(with_detail(one, recipe, tuple(extent.tolist())) for one in each) for each in (handles, held))
+    replay = replayed(device, recipe.edited(**dict(zip(("handle", "pin"), finely, strict=True))), size=size)
+    replay.seek(recipe.ticks - 15)
+    before = replay.handles.places
+    replay.seek(recipe.ticks)
+    assert replay.window is not None
+    assert replay.handles.away.max() * 512 < 0.05
+    assert np.hypot(*(replay.handles.places - before).T).max() * 512 / 0.25 < 0.1
+    found = replay.warp.statistics()
+    assert found.folds == 0
+    assert found.det_min > 0.2
+    replay.release()

@@ -15,6 +15,7 @@ from app.media import project as projects
 from app.media.pictures import read_picture
 from app.model.handles import ARRIVED, MOST_HANDLES, MOST_LINES
 from app.model.recipe import Recipe
+from app.model.windows import with_detail
 from app.progress import Progress
 from app.ui.events import Mods
 from app.ui.theme import packed
@@ -61,7 +62,7 @@ def test_a_point_is_dragged_where_it_shall_go_and_stays_there(robot: Robot) -> N
     assert session.held[0].now == pytest.approx(handle.goal, abs=2 * ARRIVED)
 
 
-@pytest.mark.parametrize(("radius", "way"), [(0.06, 0.03), (0.1, 0.05)])
+@pytest.mark.parametrize(("radius", "way"), [(0.06, 0.09), (0.1, 0.15)])
 def test_nobody_says_that_one_is_on_its_way_where_time_stands_still(
     device: Device, tmp_path: Path, radius: float, way: float
 ) -> None:
@@ -467,3 +468,20 @@ def test_a_handle_that_holds_back_a_stroke_is_told_of_once(robot: Robot) -> None
     robot.key("ctrl+z")
     robot.rest()
     assert told() == []
+
+
+def test_a_handle_is_solved_as_finely_as_its_size_asks_for(robot: Robot) -> None:
+    """Nobody chooses that; undone it is as before, and on the whole picture where that is fine enough."""
+    robot.editor.state.brush = replace(robot.editor.state.brush, radius=0.05)
+    drag(robot, (0.4, 0.5), (0.43, 0.48))
+    session = robot.editor.session
+    (made,) = session.recipe.handle
+    assert made.detail == with_detail(made, session.recipe, session.extent).detail
+    assert 18 <= made.detail * made.radius <= 24.1
+    warped = robot.warp()
+    session.edit_held("Size of a handle", "handle[1]", radius=0.4)
+    assert session.recipe.handle[0].detail <= session.recipe.fluid.grid
+    robot.key("ctrl+z")
+    robot.rest()
+    assert session.recipe.handle == (made,)
+    assert np.array_equal(robot.warp(), warped)

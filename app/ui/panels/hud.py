@@ -151,7 +151,7 @@ def _statistics(ui: Ui, canvas: Rect, session: Session, numbers: Numbers, clock:
             ui.dim(f"det J  {stats.map.det_min:.2f} to {stats.map.det_max:.2f}    folds {stats.map.folds}")
             ui.dim(f"Divergence  {stats.divergence:.1e} / s")
         grid, window = session.replay.fluid.grid, session.replay.window
-        part = f" of {window.detail} around the brush" if window else ""
+        part = f" of {window.detail} where it moves" if window else ""
         ui.dim(f"Grid {grid.nx} x {grid.ny}{part}    tick {session.tick}")
 
 
