@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -49,8 +50,9 @@ class ForwardMap:
     def at(self, points: np.ndarray) -> np.ndarray:
         """The displacement F at points (n, 2) of the original, in longer sides: float32 (n, 2)."""
         points = places(points)
-        self._find_guess()
-        inputs = self._inputs(self._regions(points))
+        near = self._near(points)
+        self._find_guess(near if 2 * near[..., 0].size < self._guess.width * self._guess.height else None)
+        inputs = self._inputs(self._regions(points, near))
         return draw_at(self._warp.device, points, self._warp.extent, "warp/invert.frag", **inputs)
 
     def release(self) -> None:
@@ -67,18 +69,49 @@ class ForwardMap:
         displacement = self._warp.composed(exact=True, regions=regions)
         return {"displacement": displacement, "guess": self._guess, "extent": self._warp.extent}
 
-    def _find_guess(self) -> None:
-        warp = self._warp
-        if self._guessed != warp.version:
-            self._guess.clear()
-            cells = (self._guess.width + 1) * (self._guess.height + 1)
-            scatter = warp.device.pass_("warp/scatter.frag")
-            scatter(
-                self._guess, triangles=(0, 6 * cells), displacement=warp.composed(self._guess.size), extent=warp.extent
-            )
-            self._guessed = warp.version
+    def _near(self, points: np.ndarray) -> np.ndarray:
+        """Texels of the guess that points lie between, and one more each way as it may be rounded: (n, 16, 2)."""
+        guesses = np.array(self._guess.size)
+        corner = np.floor(points / self._warp.extent * guesses - 0.5)
+        steps = np.mgrid[-1:3, -1:3].reshape(2, -1).T
+        return np.clip(corner[:, None] + steps, 0, guesses - 1).astype(int)
 
-    def _regions(self, points: np.ndarray) -> list[Region] | None:
+    def _find_guess(self, near: np.ndarray | None = None) -> None:
+        """Draw the guess; or only what these texels (n, k, 2) show of it, of which a software rasteriser has less."""
+        warp = self._warp
+        wanted = warp.version, None if near is None else near.tobytes()
+        if self._guessed in ((warp.version, None), wanted):
+            return
+        moved = warp.composed(self._guess.size)
+        cells = (self._guess.width + 1) * (self._guess.height + 1)
+        self._guess.clear()
+        scatter = warp.device.pass_("warp/scatter.frag")
+        for first, count in [(0, cells)] if near is None else self._cells_at(near, moved.get()):
+            scatter(self._guess, triangles=(6 * first, 6 * count), displacement=moved, extent=warp.extent)
+        self._guessed = wanted
+
+    def _cells_at(self, near: np.ndarray, displacement: np.ndarray) -> Iterator[tuple[int, int]]:
+        """The cells of the map that may be looked up in these texels of the guess: the first of each run, how many."""
+        wanted = np.zeros((self._guess.height, self._guess.width), np.int32)
+        wanted[near[..., 1], near[..., 0]] = 1
+        up_to = np.pad(wanted.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))  # so many of them above and to the left
+        size, ends, is_near = self._guess.size, list[np.ndarray](), True
+        for axis, (count, side) in enumerate(zip(size, self._warp.extent, strict=True)):
+            nodes = np.clip(np.arange(count + 2, dtype=np.float32) - 0.5, 0.0, count)
+            moved = np.pad(displacement[..., axis] * np.float32(count / side), 1, mode="edge")
+            moved += nodes if axis == 0 else nodes[:, None]
+            for extreme, more in ((np.minimum, -1), (np.maximum, 2)):
+                pairs = extreme(moved[1:], moved[:-1])
+                ends.append(np.clip(extreme(pairs[:, 1:], pairs[:, :-1]) + more, 0, count))
+            is_near &= (ends[-2] <= near[..., axis].max() + 1) & (ends[-1] >= near[..., axis].min())
+        numbers = np.flatnonzero(is_near)
+        left, right, top, bottom = (end.ravel()[numbers].astype(int) for end in ends)
+        among = up_to[bottom, right] - up_to[top, right] - up_to[bottom, left] + up_to[top, left]
+        numbers = numbers[among > 0]
+        for run in np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1) if len(numbers) else ():
+            yield int(run[0]), len(run)
+
+    def _regions(self, points: np.ndarray, near: np.ndarray) -> list[Region] | None:
         """The texels of the map among which Newton's method finds these points; None if they may be half of it."""
         extent, size, guesses = np.array(self._warp.extent), np.array(self._warp.size), np.array(self._guess.size)
         reach = ROUNDS * np.sqrt(0.5) * np.hypot(*(extent / guesses))  # no round goes farther
@@ -86,14 +119,10 @@ class ForwardMap:
         if 2 * len(points) * np.prod(least) >= np.prod(size):
             return None
         guess = self._guess.get()
-        corner = np.floor(points / extent * guesses - 0.5).astype(int)
-        # Those that a point lies between, and one more each way as it may be rounded.
-        steps = np.mgrid[-1:3, -1:3].reshape(2, -1).T
-        near = np.clip(corner + steps[:, None], 0, guesses - 1)
-        starts = points + guess[near[..., 1], near[..., 0]]
-        starts = np.concatenate([starts, np.clip(starts, 0.0, extent)])  # from outside it goes on at the edge
-        low = np.floor((starts.min(axis=0) - reach) / extent * size).astype(int) - AROUND
-        high = np.ceil((starts.max(axis=0) + reach) / extent * size).astype(int) + AROUND
+        starts = points[:, None] + guess[near[..., 1], near[..., 0]]
+        starts = np.concatenate([starts, np.clip(starts, 0.0, extent)], axis=1)  # from outside it goes on at the edge
+        low = np.floor((starts.min(axis=1) - reach) / extent * size).astype(int) - AROUND
+        high = np.ceil((starts.max(axis=1) + reach) / extent * size).astype(int) + AROUND
         low, high = np.clip(low, 0, size), np.clip(high, 0, size)
         if 2 * np.prod(high - low, axis=1).sum() >= np.prod(size):
             return None

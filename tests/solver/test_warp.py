@@ -13,6 +13,7 @@ from solver.brush.masks import Masks
 from solver.fluid import Fluid
 from solver.gl.device import Device
 from solver.gl.field import Field
+from solver.gl.passes import Pass
 from solver.gl.tiled import TILE, TiledField
 from solver.grid import Grid
 from solver.paper import PaperWarpMap
@@ -514,6 +515,41 @@ def test_forward_map_of_a_few_points_needs_a_part_of_the_map_only(
     assert drawn[-1] == 1
     forward.release()
     warp.release()
+
+
+@pytest.mark.parametrize("strength", [0.0, 0.1, 0.4, 2.0])
+def test_forward_map_of_a_few_points_draws_only_what_is_looked_up_at_them(
+    device: Device, monkeypatch: pytest.MonkeyPatch, strength: float
+) -> None:
+    """To the bit as where all cells are drawn, however far they go and wherever the points lie."""
+    rng, drawn, call = np.random.default_rng(5), list[int](), Pass.__call__
+    warp = WarpMap(device, Grid(64, 48), (1280, 960))
+    if strength:
+        warp.set(smooth(rng, warp.size, strength))
+    inside, at_edges = rng.uniform((0.0, 0.0), (1.0, 0.75), (30, 2)), [(0.0, 0.0), (1.0, 0.75), (1.0, 0.2), (1.2, -0.3)]
+    points = np.vstack([inside, at_edges])
+
+    def note(self: Pass, *args: Any, triangles: Any = None, **more: Any) -> None:
+        if triangles is not None:
+            drawn.append(triangles[1])
+        call(self, *args, triangles=triangles, **more)
+
+    monkeypatch.setattr(Pass, "__call__", note)
+    whole, few = ForwardMap(warp), ForwardMap(warp)
+    wanted = whole.at(np.tile(points, (250, 1)))[: len(points)]
+    (all_of_it,) = drawn
+    drawn.clear()
+    for point, expected in zip(points, wanted, strict=True):
+        np.testing.assert_array_equal(few.at(point[None])[0], expected)
+    assert sum(drawn) < 0.01 * all_of_it * len(points)
+    np.testing.assert_array_equal(few.at(points), wanted)
+    drawn.clear()
+    few.at(points)
+    few.at(np.tile(points, (250, 1)))
+    few.at(points[:1])
+    assert drawn == [all_of_it]  # what is known is not drawn anew
+    for thing in (whole, few, warp):
+        thing.release()
 
 
 def test_forward_map_of_a_folded_one_is_finite(device: Device) -> None:
