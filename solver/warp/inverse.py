@@ -100,12 +100,17 @@ class ForwardMap:
             nodes = np.clip(np.arange(count + 2, dtype=np.float32) - 0.5, 0.0, count)
             moved = np.pad(displacement[..., axis] * np.float32(count / side), 1, mode="edge")
             moved += nodes if axis == 0 else nodes[:, None]
-            for extreme, more in ((np.minimum, -1), (np.maximum, 2)):
+            for extreme in (np.minimum, np.maximum):
                 pairs = extreme(moved[1:], moved[:-1])
-                ends.append(np.clip(extreme(pairs[:, 1:], pairs[:, :-1]) + more, 0, count))
-            is_near &= (ends[-2] <= near[..., axis].max() + 1) & (ends[-1] >= near[..., axis].min())
+                ends.append(extreme(pairs[:, 1:], pairs[:, :-1]))
+            is_near &= (ends[-2] <= near[..., axis].max() + 2) & (ends[-1] >= near[..., axis].min() - 1)
         numbers = np.flatnonzero(is_near)
-        left, right, top, bottom = (end.ravel()[numbers].astype(int) for end in ends)
+        left, top = (
+            np.clip(low.ravel()[numbers] - 1, 0, most).astype(int) for low, most in zip(ends[::2], size, strict=True)
+        )
+        right, bottom = (
+            np.clip(high.ravel()[numbers] + 2, 0, most).astype(int) for high, most in zip(ends[1::2], size, strict=True)
+        )
         among = up_to[bottom, right] - up_to[top, right] - up_to[bottom, left] + up_to[top, left]
         numbers = numbers[among > 0]
         for run in np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1) if len(numbers) else ():
