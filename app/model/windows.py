@@ -103,6 +103,7 @@ class Led(NamedTuple):
         reach: how far it reaches as a whole, and `push`, each of its points.
         here, then: where its points are and shall be a tick later, (k, 2).
         is_moving: it is not at rest there, and `begins` if it sets out in this tick.
+        is_late: it is led no farther, and only has not arrived yet.
     """
 
     detail: int
@@ -112,6 +113,7 @@ class Led(NamedTuple):
     then: np.ndarray
     is_moving: bool
     begins: bool
+    is_late: bool = False
 
 
 class FlowWindow(NamedTuple):
@@ -147,8 +149,33 @@ class FlowWindow(NamedTuple):
             they asked for, as a wide movement has needed it, and handles unless a finer one has room to spare. None if
             one of them wants the whole picture, as a stroke with images all over it does, or if no window with cells
             finer than those of `whole` has room for them. What is at rest has room where it feels what moves, so that
-            it can hold against that; elsewhere it needs none.
+            it can hold against that; elsewhere it needs none. Nor does what is late, if it would take fine cells from
+            what is led on: it waits until that has arrived, and what lies in the window arrives before what does not.
         """
+        found = cls._around(acts, now, whole, led)
+        late = [each.is_moving and each.is_late for each in led]
+        if not any(late) or not all(each.detail for each in led):
+            return found
+        first = [each.is_moving and not each.is_late for each in led]
+        if not acts and not any(first):
+            box = whole if now is None else now.grid_in(whole)
+            sides = [*box.origin, *np.add(box.origin, box.extent).tolist()]
+            first = [waits and _are_within(each.here, sides) for waits, each in zip(late, led, strict=True)]
+            if not any(first):
+                first[late.index(True)] = True
+        details = [act.stroke.detail for act in acts] + [
+            each.detail for each, is_first in zip(led, first, strict=True) if is_first
+        ]
+        if (max(whole.size) if found is None else found.detail) >= min(details):
+            return found
+        waiting = [
+            each._replace(is_moving=each.is_moving and is_first) for each, is_first in zip(led, first, strict=True)
+        ]
+        return cls._around(acts, now, whole, waiting)
+
+    @classmethod
+    def _around(cls, acts: Sequence[Act], now: Self | None, whole: Grid, led: Sequence[Led]) -> Self | None:
+        """The window for all that."""
         moving = [each for each in led if each.is_moving]
         if not all(each.detail for each in led):
             return None

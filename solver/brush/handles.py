@@ -84,6 +84,7 @@ class Way(NamedTuple):
         is_moving: it is not at rest where it shall be: it is led on, or more than a texel of the map away, unless it
             has let go.
         begins: it sets out, from rest, in this step.
+        is_late: where it shall be rests already.
     """
 
     number: int
@@ -91,6 +92,7 @@ class Way(NamedTuple):
     then: np.ndarray
     is_moving: bool
     begins: bool
+    is_late: bool
 
 
 class Targets(NamedTuple):
@@ -304,7 +306,7 @@ class Handles:
             waits = self._progress[number, 1] <= PATIENCE or has_ended
             is_away = waits and float(np.hypot(*(then - here).T).max()) > near
             is_begun = not (was_led and np.isfinite(self._starts[rows]).all())
-            found.append(Way(number, here, then, bool(is_led or is_away), bool(is_led and is_begun)))
+            found.append(Way(number, here, then, bool(is_led or is_away), bool(is_led and is_begun), not is_led))
         return found
 
     def make_up(self, velocity: Field) -> None:

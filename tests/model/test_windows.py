@@ -179,6 +179,34 @@ def test_handles_too_far_apart_for_a_fine_window_have_a_coarser_one():
     assert anew.detail == 512
 
 
+def test_what_is_late_waits_for_fine_cells_until_others_have_arrived():
+    late, whole = {"way": 0.002, "is_late": True}, Grid.for_picture(6000, 4000, 96)
+    near, far = led((0.1, 0.1), **late), led((0.9, 0.6), **late)
+    at_far = FlowWindow.of([], None, whole, [far])
+    assert at_far is not None
+    assert at_far.detail == 512
+    # One that is led on has them first, and a stroke likewise; what lies beside it has room there.
+    goes_on = led((0.9, 0.6), way=0.002)
+    assert FlowWindow.of([], None, whole, [near, goes_on]) == at_far
+    assert FlowWindow.of([], at_far, whole, [goes_on, near]) == at_far
+    painted = Act(stroke(0.02, detail=682), 0, at(0.9, 0.9, 0.9, 0.9))
+    assert FlowWindow.of([painted], at_far, whole, [near]) == FlowWindow.of([painted], at_far, whole)
+    beside = FlowWindow.of([], None, whole, [led((0.8, 0.5), **late), goes_on])
+    assert beside is not None
+    assert beside.detail == 512
+    # Then what lies in the window, and then the first of the others.
+    assert FlowWindow.of([], at_far, whole, [near, far]) == at_far
+    assert FlowWindow.of([], at_far, whole, [near, led((0.9, 0.6))]) == FlowWindow.of([], at_far, whole, [near])
+    elsewhere = FlowWindow.of([], at_far, whole, [near, led((0.1, 0.6), **late), led((0.9, 0.6))])
+    assert elsewhere == FlowWindow.of([], at_far, whole, [near])
+    # Where all lie in a coarser one, it stays as it is.
+    coarse = FlowWindow.of([], None, whole, [led((0.1, 0.1), way=0.002), led((0.9, 0.6), way=0.002)])
+    assert coarse is not None
+    assert FlowWindow.of([], coarse, whole, [near, far]) == coarse
+    # One on the whole picture has all there, late or not.
+    assert FlowWindow.of([], at_far, whole, [goes_on, led((0.1, 0.1), detail=0, **late)]) is None
+
+
 def test_one_handle_on_the_whole_picture_has_all_there():
     here = led((0.5, 0.3), way=0.002)
     assert FlowWindow.of([], FlowWindow(512, 100, 30), WHOLE, [here, led((0.1, 0.1), detail=0)]) is None
@@ -388,6 +416,25 @@ def test_a_handle_in_a_window_arrives_where_on_the_whole_picture_it_does_not(dev
         replay.release()
     assert left[0].max() < 1.0
     assert left[1].max() > 50.0
+
+
+def test_handles_led_one_after_another_all_arrive_in_fine_windows(device: Device):
+    """Each begins before the one before it, far from it, has arrived: none is led on cells that the others need."""
+    fluid = FluidSettings(grid=48, viscosity=HONEY.viscosity, drag=HONEY.drag)
+    recipe, places = Recipe(fluid=fluid, duration=2.0), [(0.15, 0.2), (0.85, 0.8), (0.15, 0.8)]
+    handles = [
+        RecipeHandle(at=place, to=(place[0] + 0.012, place[1]), radius=0.02, start=0.3 * number, duration=0.28)
+        for number, place in enumerate(places)
+    ]
+    recipe = recipe.edited(handle=tuple(with_detail(each, recipe, (1.0, 2 / 3)) for each in handles))
+    replay, details = replayed(device, recipe, size=FINE), set[int]()
+    while replay.tick < recipe.ticks:
+        replay.advance()
+        assert replay.window is not None
+        details.add(replay.window.detail)
+    assert details == {recipe.handle[0].detail}
+    assert (replay.handles.away * 512).max() < 0.5
+    replay.release()
 
 
 def test_what_is_at_rest_outside_the_window_stays_there(device: Device):
