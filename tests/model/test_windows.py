@@ -180,7 +180,8 @@ def test_handles_too_far_apart_for_a_fine_window_have_a_coarser_one():
 
 
 def test_what_is_late_waits_for_fine_cells_until_others_have_arrived():
-    late, whole = {"way": 0.002, "is_late": True}, Grid.for_picture(6000, 4000, 96)
+    late: dict[str, Any] = {"way": 0.002, "is_late": True}
+    whole = Grid.for_picture(6000, 4000, 96)
     near, far = led((0.1, 0.1), **late), led((0.9, 0.6), **late)
     at_far = FlowWindow.of([], None, whole, [far])
     assert at_far is not None
