@@ -118,7 +118,7 @@ def test_a_window_lies_in_any_picture(size: tuple[int, int], place: tuple[float,
 
 def led(*places: tuple[float, float], detail: int = 512, way: float = 0.0, begins: bool = False, **more: Any) -> Led:
     """A handle of radius .04 at places in longer sides, which moves so far to the right in a tick, or rests."""
-    here, given = np.array(places), {"reach": 0.04, "push": 0.04} | more
+    here, given = np.array(places), dict[str, Any](reach=0.04, push=0.04) | more
     there = here + np.array([way, 0.0])
     return Led(detail=detail, here=here, then=there, is_moving=way > 0, begins=begins, **given)
 
