@@ -149,7 +149,7 @@ def unmet(replay: Replay, within: float, is_fitted: bool = False) -> Iterator[Un
             columns, rows = np.clip(held / replay.grid.spacing, 0, np.array(replay.grid.size) - 1).astype(int).T
             if halt == "strain" and _nearest_of(solid, replay, held) < led.radius:
                 halt = "frozen"
-            why, cells = HALTED[halt], led.radius * max(replay.grid.size)
+            why, cells = HALTED[halt], led.radius * max(led.detail, *replay.grid.size)
             # A fit leads what goes somewhere, and leaves pins as they are.
             helped = halt in HELPED and isinstance(led, RecipeHandle) and led.is_led and not is_fitted
             is_wide = cells >= LEAST_PER_RADIUS or (isinstance(led, RecipeHandle) and led.local == 1)
