@@ -357,9 +357,9 @@ class Replay:
         if not all(led.detail for _, led in self.led if led.is_in_force(self.tick, self.recipe.fluid.dt)):
             return [WHOLE]
         dt, found = self.recipe.fluid.dt, list[Led]()
-        for number, *way in self.handles.ways(self.tick * dt, dt):
+        for number, here, then, is_moving, begins, is_late in self.handles.ways(self.tick * dt, dt):
             (_, led), handle = self.led[number], self.handles.handles[number]
-            found.append(Led(led.detail, handle.reach, handle.push_radius, *way))
+            found.append(Led(led.detail, handle.reach, handle.push_radius, here, then, is_moving, begins, is_late))
         return found
 
     def _cells_of(self, window: FlowWindow | None) -> Grid:
