@@ -37,7 +37,10 @@ LEAST_TEXELS = 4  # along a cell, with which the map's own interpolation costs n
 MOST_TEXELS = 2**25  # in all: 256 MiB each of two textures
 REACH = 3  # texels that the cubic reaches to one side, at most
 NOWHERE = 1e-4  # texels: a smaller displacement counts as none
-STEEPEST = 6.0  # largest |grad A| of a map that is not closed: one that stretches more folds between its texels
+# Largest |grad A| of a map that is not closed, with `LEAST_TEXELS` along the finest cell that has moved it, and as many
+# times as large with more: so its neighbouring texels lead to places at most 1.5 cells apart. A steeper one folds
+# between them.
+STEEPEST = 6.0
 # The least part that det J on one side of a texel may be of that on another: where they differ by more than the smaller
 # one, the interpolation may as well be folded.
 LEAST_EVEN = 0.5
@@ -243,10 +246,16 @@ class AccumulatedMap:
     def _is_too_steep(self, held: Field | None) -> bool:
         """True if the map that was drawn is more than its texels carry, and was not so before; waits for the GPU."""
         steepest = self._steepness.found()
-        if not FLAT**2 < steepest <= STEEPEST**2:
+        if not FLAT**2 < steepest <= self._steepest**2:
             return steepest > FLAT**2
         even = partial(self._evenness.of, spacing=self._spacing, images=self.edges, regions=self._moved, held=held)
         return even(self._next) < LEAST_EVEN <= even(self.now)
+
+    @property
+    def _steepest(self) -> float:
+        """The largest |grad A| that it carries, with as many texels as it will have once it is closed."""
+        texels = (self.finest * n / side for n, side in zip(self._closed_size, self.extent, strict=True))
+        return STEEPEST * max(min(texels) / LEAST_TEXELS, 1.0)
 
     @property
     def _spacing(self) -> tuple[float, float]:
