@@ -7,8 +7,8 @@
 // u_submap, u_second, u_third, u_accumulated, u_closed_0 to u_closed_8: displacements, longer sides, and of what is undone
 // the part, 0-1, in the third component; u_window, u_second_window, u_third_window: left, top, width and height that the
 // submaps cover, u_picture: width and height of the picture, u_limits: left, top, right, bottom, longer sides; u_images,
-// u_second_images, u_third_images: what lies beyond the windows' sides, u_edges: beyond the picture's, of A and of closed
-// maps, as in lib/displacement.glsl; 0 if something has crossed them, and then nothing has images.
+// u_second_images, u_third_images: what lies beyond the windows' sides, u_edges, u_edges_0 to u_edges_8: beyond the
+// picture's, of A and of closed maps, as in lib/displacement.glsl; 0 if something has crossed them: nothing has images then.
 // Define HELD if something is frozen, for u_held and u_kept, over A's texels: see is_held. Define WEIGHED for the submaps
 // that are carried less and less before that, 1, 2 and 4 or their sum, and FADED: see weight.
 #include "lib/displacement.glsl"
@@ -38,60 +38,70 @@ uniform vec4 u_third_images;
 #ifndef UNDONE
 #define UNDONE 0
 #endif
-// THROUGH_CLOSED(GO) is GO(closed, number) of each closed map, the last one closed first: GLSL 3.30 has no array of samplers
+#define IS_UNDONE(number) ((UNDONE >> number & 1) != 0)
+// THROUGH_CLOSED(GO) is GO(closed, edges, number) of each closed map, the last one closed first: GLSL 3.30 has no array of samplers
 // to go through.
 #define THROUGH_0(GO)
 #if CLOSED > 0
 uniform sampler2D u_closed_0;
-#define THROUGH_1(GO) GO(u_closed_0, 0) THROUGH_0(GO)
+uniform vec4 u_edges_0;
+#define THROUGH_1(GO) GO(u_closed_0, u_edges_0, 0) THROUGH_0(GO)
 #else
 #define THROUGH_1(GO) THROUGH_0(GO)
 #endif
 #if CLOSED > 1
 uniform sampler2D u_closed_1;
-#define THROUGH_2(GO) GO(u_closed_1, 1) THROUGH_1(GO)
+uniform vec4 u_edges_1;
+#define THROUGH_2(GO) GO(u_closed_1, u_edges_1, 1) THROUGH_1(GO)
 #else
 #define THROUGH_2(GO) THROUGH_1(GO)
 #endif
 #if CLOSED > 2
 uniform sampler2D u_closed_2;
-#define THROUGH_3(GO) GO(u_closed_2, 2) THROUGH_2(GO)
+uniform vec4 u_edges_2;
+#define THROUGH_3(GO) GO(u_closed_2, u_edges_2, 2) THROUGH_2(GO)
 #else
 #define THROUGH_3(GO) THROUGH_2(GO)
 #endif
 #if CLOSED > 3
 uniform sampler2D u_closed_3;
-#define THROUGH_4(GO) GO(u_closed_3, 3) THROUGH_3(GO)
+uniform vec4 u_edges_3;
+#define THROUGH_4(GO) GO(u_closed_3, u_edges_3, 3) THROUGH_3(GO)
 #else
 #define THROUGH_4(GO) THROUGH_3(GO)
 #endif
 #if CLOSED > 4
 uniform sampler2D u_closed_4;
-#define THROUGH_5(GO) GO(u_closed_4, 4) THROUGH_4(GO)
+uniform vec4 u_edges_4;
+#define THROUGH_5(GO) GO(u_closed_4, u_edges_4, 4) THROUGH_4(GO)
 #else
 #define THROUGH_5(GO) THROUGH_4(GO)
 #endif
 #if CLOSED > 5
 uniform sampler2D u_closed_5;
-#define THROUGH_6(GO) GO(u_closed_5, 5) THROUGH_5(GO)
+uniform vec4 u_edges_5;
+#define THROUGH_6(GO) GO(u_closed_5, u_edges_5, 5) THROUGH_5(GO)
 #else
 #define THROUGH_6(GO) THROUGH_5(GO)
 #endif
 #if CLOSED > 6
 uniform sampler2D u_closed_6;
-#define THROUGH_7(GO) GO(u_closed_6, 6) THROUGH_6(GO)
+uniform vec4 u_edges_6;
+#define THROUGH_7(GO) GO(u_closed_6, u_edges_6, 6) THROUGH_6(GO)
 #else
 #define THROUGH_7(GO) THROUGH_6(GO)
 #endif
 #if CLOSED > 7
 uniform sampler2D u_closed_7;
-#define THROUGH_8(GO) GO(u_closed_7, 7) THROUGH_7(GO)
+uniform vec4 u_edges_7;
+#define THROUGH_8(GO) GO(u_closed_7, u_edges_7, 7) THROUGH_7(GO)
 #else
 #define THROUGH_8(GO) THROUGH_7(GO)
 #endif
 #if CLOSED > 8
 uniform sampler2D u_closed_8;
-#define THROUGH_CLOSED(GO) GO(u_closed_8, 8) THROUGH_8(GO)
+uniform vec4 u_edges_8;
+#define THROUGH_CLOSED(GO) GO(u_closed_8, u_edges_8, 8) THROUGH_8(GO)
 #else
 #define THROUGH_CLOSED(GO) THROUGH_8(GO)
 #endif
@@ -175,13 +185,13 @@ vec2 held_displacement(vec2 place) { return cubic_displacement(u_kept, on_texel(
 
 // A, a closed map or what is undone, at a place in its texels: by the cubic with CUBIC, bilinearly with LINEAR, else by the
 // quintic.
-vec4 accumulated_texels(sampler2D accumulated, vec2 place) {
+vec4 accumulated_texels(sampler2D accumulated, vec2 place, vec4 edges) {
 #if defined(LINEAR)
     return linear_texels(accumulated, place);
 #elif defined(CUBIC)
-    return cubic_texels(accumulated, place, u_edges);
+    return cubic_texels(accumulated, place, edges);
 #else
-    return quintic_texels(accumulated, place, u_edges);
+    return quintic_texels(accumulated, place, edges);
 #endif
 }
 
@@ -190,17 +200,17 @@ vec2 texels_of(sampler2D closed) { return vec2(textureSize(closed, 0)) / vec2(te
 
 // Looks a closed map up where x has been led: x + moved + more, kept in the picture. `place` is x + moved in A's texels; it
 // is moved along and not computed anew, so that it stays on its texel to the bit where nothing has moved.
-void follow(sampler2D closed, vec2 x, inout vec2 moved, inout vec2 more, inout vec2 place) {
+void follow(sampler2D closed, vec4 edges, vec2 x, inout vec2 moved, inout vec2 more, inout vec2 place) {
     vec2 led = within_picture(x, moved + more) - moved;
     moved += led;
     place += led * vec2(textureSize(u_accumulated, 0)) / u_picture;
-    more = accumulated_texels(closed, place * texels_of(closed)).rg;
+    more = accumulated_texels(closed, place * texels_of(closed), edges).rg;
 }
 
 // What the restore brush has undone at a place in A's texels: a way (E), and the part of what follows (T). E is read as A is,
 // so that beneath the brush they add up to what A was also between texels.
-vec3 undone_at(sampler2D undone, vec2 place) {
-    vec3 read = accumulated_texels(undone, place * texels_of(undone)).rgb;
+vec3 undone_at(sampler2D undone, vec4 edges, vec2 place) {
+    vec3 read = accumulated_texels(undone, place * texels_of(undone), edges).rgb;
     return vec3(read.rg, clamp(read.b, 0.0, 1.0));
 }
 
@@ -216,10 +226,10 @@ void undo(vec3 undone, vec2 moved, inout vec2 more, inout vec2 back, inout float
 
 // D(x) of x that the submaps have `moved`, to `place` in A's texels.
 vec2 displacement_from(vec2 x, vec2 moved, vec2 place) {
-    vec2 more = accumulated_texels(u_accumulated, place).rg, back = vec2(0.0);
+    vec2 more = accumulated_texels(u_accumulated, place, u_edges).rg, back = vec2(0.0);
     float part = 1.0;
-#define UNDO(undone) undo(undone_at(undone, place), moved, more, back, part)
-#define FOLLOW(closed, number) if ((UNDONE >> number & 1) != 0) UNDO(closed); else follow(closed, x, moved, more, place);
+#define UNDO(undone, edges) undo(undone_at(undone, edges, place), moved, more, back, part)
+#define FOLLOW(closed, edges, n) if (IS_UNDONE(n)) UNDO(closed, edges); else follow(closed, edges, x, moved, more, place);
     THROUGH_CLOSED(FOLLOW)
 #undef FOLLOW
 #undef UNDO

@@ -26,7 +26,6 @@ from solver.warp.state import (
     MOST_CLOSED,
     MOST_CLOSED_BYTES,
     OPEN,
-    STICKING,
     UNDONE,
     UNDONE_COMPONENTS,
     Images,
@@ -37,9 +36,8 @@ LEAST_TEXELS = 4  # along a cell, with which the map's own interpolation costs n
 MOST_TEXELS = 2**25  # in all: 256 MiB each of two textures
 REACH = 3  # texels that the cubic reaches to one side, at most
 NOWHERE = 1e-4  # texels: a smaller displacement counts as none
-# Largest |grad A| of a map that is not closed, with `LEAST_TEXELS` along the finest cell that has moved it, and as many
-# times as large with more: so its neighbouring texels lead to places at most 1.5 cells apart. A steeper one folds
-# between them.
+# Largest |grad A| of a map that is not closed, with `LEAST_TEXELS` along the finest cell that has moved it. With texels of h
+# it is in proportion to h^(-3/4): det J is wrong by |grad A|^4 h^3 between them.
 STEEPEST = 6.0
 # The least part that det J on one side of a texel may be of that on another: where they differ by more than the smaller
 # one, the interpolation may as well be folded.
@@ -96,7 +94,8 @@ class AccumulatedMap:
         limits: of the places looked up: left, top, right, bottom.
         finest: the smallest cell that has moved the map, longer sides; 0 if it may have any detail.
         is_walled: nothing has crossed the picture's edges.
-        images: what lies beyond these then: it glides along an edge once anything that it has taken in has.
+        images: what lies beyond these then, as of what it has taken in there; 0 where it has taken in nothing.
+        closed_images: the same of the closed maps.
     """
 
     def __init__(self, device: Device, size: tuple[int, int], extent: tuple[float, float]) -> None:
@@ -104,6 +103,7 @@ class AccumulatedMap:
         self.size = size
         self.extent = extent
         self.closed: list[TiledField] = []
+        self.closed_images: list[Images] = []
         self._steepness = Steepness(device, size, "accumulated map", TILE=TILE)
         self._evenness = Evenness(device, size, self._steepness.blocks)
         self.now = TiledField(device, size, 2, "accumulated map")
@@ -117,7 +117,7 @@ class AccumulatedMap:
         self._done = 0  # of both
         self.limits = self._picture = (0.0, 0.0, *extent)
         self.is_walled = True
-        self.images = STICKING
+        self.images = OPEN
         self.finest = 1.0
 
     def is_fine(self, grid: Grid) -> bool:
@@ -165,6 +165,7 @@ class AccumulatedMap:
         return (
             self.own()
             | {f"closed_{number}": field for number, field in enumerate(self._chain)}
+            | {f"edges_{number}": self._edges_of(images) for number, images in enumerate(self.chain_images)}
             | {"limits": self.limits}
         )
 
@@ -175,12 +176,26 @@ class AccumulatedMap:
 
     @property
     def edges(self) -> Images:
-        """What lies beyond the picture's edges, of it and of the closed maps."""
-        return self.images if self.is_walled else OPEN
+        """What lies beyond the picture's edges."""
+        return self._edges_of(self.images)
+
+    def _edges_of(self, images: Images) -> Images:
+        """Where nothing has been taken in, nothing moves."""
+        left, right, top, bottom = (image or -1.0 for image in images)
+        return (left, right, top, bottom) if self.is_walled else OPEN
 
     def take_sides(self, images: Images) -> None:
-        """Glide from now on along the edges along which a submap that will be taken in has."""
-        left, right, top, bottom = map(max, self.images, images)
+        """Go on as a submap that will be taken in: it glides along the picture's edges or sticks; 0 where it has none.
+
+        A map does one or the other along an edge, so it is closed before it has to do both; if it cannot be, it glides.
+        """
+        if any(mine * its < 0 for mine, its in zip(self.images, images, strict=True)):
+            if self.now.tiles and self.may_close:
+                self.close()
+            elif not self.now.tiles:
+                self.images = OPEN
+        both = zip(self.images, images, strict=True)
+        left, right, top, bottom = (max(mine, its) if mine and its else mine + its for mine, its in both)
         self.images = left, right, top, bottom
 
     @property
@@ -255,7 +270,7 @@ class AccumulatedMap:
     def _steepest(self) -> float:
         """The largest |grad A| that it carries, with as many texels as it will have once it is closed."""
         texels = (self.finest * n / side for n, side in zip(self._closed_size, self.extent, strict=True))
-        return STEEPEST * max(min(texels) / LEAST_TEXELS, 1.0)
+        return STEEPEST * max(min(texels) / LEAST_TEXELS, 1.0) ** 0.75
 
     @property
     def _spacing(self) -> tuple[float, float]:
@@ -265,6 +280,7 @@ class AccumulatedMap:
         """Keep it as it is, and go on with a map of nothing; what was planned is forgotten."""
         self.forget()
         size, steep = self._closed_size, [self.now] if self.undone is None else [self.undone, self.now]
+        self.closed_images += [self.images] * len(steep)
         if size == self.size:
             self.closed += steep
             self.now, self.undone = self._blank(2, "accumulated map"), None
@@ -280,7 +296,7 @@ class AccumulatedMap:
             self.now, self._next = self._next, self.now
             self.now.clear()
         self._drop_undone()
-        self.finest = 1.0
+        self.finest, self.images = 1.0, OPEN
         self._stale = set(self._next.tiles)  # cleared with the next remap, a few in each step
 
     def forget(self) -> None:
@@ -328,10 +344,18 @@ class AccumulatedMap:
         """(width, height) in texels of the closed maps, and of what is undone, as `saved` names them."""
         return [field.size for field in self._chain]
 
+    @property
+    def chain_images(self) -> list[Images]:
+        """The images of the same."""
+        return self.closed_images + ([] if self.undone is None else [self.images])
+
     def restore(
-        self, saved: dict[str, SavedTiles], limits: Limits, is_walled: bool, images: Images, finest: float
+        self, saved: dict[str, SavedTiles], limits: Limits, is_walled: bool, images: list[Images], finest: float
     ) -> None:
-        """Go back to what `saved` gave, as it was then, with all else of then; what was planned is forgotten."""
+        """Go back to what `saved` gave, as it was then, with all else of then; what was planned is forgotten.
+
+        `images`: its own and `chain_images`.
+        """
         self.forget()
         self._stale.update(self.now.restore(saved[ACCUMULATED]))
         names = closed_in(saved)
@@ -348,7 +372,9 @@ class AccumulatedMap:
             self._begin_undoing()
         if undone is not None and self.undone is not None:
             self._stale.update(self.undone.restore(undone))
-        self.limits, self.is_walled, self.images, self.finest = limits, is_walled, images, finest
+        self.limits, self.is_walled, self.finest = limits, is_walled, finest
+        self.images, *closed = images
+        self.closed_images = closed[: len(self.closed)]
 
     def clear(self) -> None:
         """The identity; what was planned is forgotten."""
@@ -358,7 +384,7 @@ class AccumulatedMap:
             field.clear()
         self._stale.clear()
         self.finest = 1.0
-        self.limits, self.is_walled, self.images = self._picture, True, STICKING
+        self.limits, self.is_walled, self.images = self._picture, True, OPEN
 
     def release(self) -> None:
         """Free the textures."""
@@ -370,6 +396,7 @@ class AccumulatedMap:
         """Drop the closed maps but the first so many, and what is undone of them."""
         while len(self.closed) > left:
             self.closed.pop().release()
+        del self.closed_images[left:]
         if not left:
             self._drop_undone()
 

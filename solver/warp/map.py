@@ -31,7 +31,21 @@ from solver.warp.factors import Factors
 from solver.warp.frozen import Frozen
 from solver.warp.prescribed import traced
 from solver.warp.remapping import Remapping
-from solver.warp.state import ACCUMULATED, FACTOR, OPEN, SIZES, SUBMAPS, Images, MapState, grid_in, images_in, values_of
+from solver.warp.state import (
+    ACCUMULATED,
+    EDGES,
+    FACTOR,
+    OPEN,
+    SIZES,
+    SUBMAPS,
+    Images,
+    MapState,
+    chain_images_in,
+    closed_in,
+    grid_in,
+    images_in,
+    values_of,
+)
 from solver.warp.submap import STEEPEST, Level, Submap, away_from_held, defines_of, images_of, inputs_of, window_of
 
 CHECK_EVERY = 2  # steps between two looks at how far the map is bent: a quick push bends it by 1 in two
@@ -343,7 +357,8 @@ class WarpMap:
         accumulated = self._accumulated
         values: dict[str, Any] = {"steps": self._steps, "limits": accumulated.limits, "walled": accumulated.is_walled}
         values[f"{ACCUMULATED} images"] = accumulated.images
-        values |= {"finest": accumulated.finest} | ({SIZES: accumulated.sizes} if accumulated.sizes else {})
+        values["finest"] = accumulated.finest
+        values |= {SIZES: accumulated.sizes, EDGES: accumulated.chain_images} if accumulated.sizes else {}
         values |= {"grid": values_of(self.grid), "settled": self._is_settled, "submap images": self._submap.images}
         fields |= self.factors.save()
         for name, level in self._remapping.saved():
@@ -370,7 +385,9 @@ class WarpMap:
         left, top, right, bottom = state.values["limits"].tolist()
         is_walled = bool(state.values.get("walled", True))
         finest = float(state.values.get("finest", 0.0))
-        self._accumulated.restore(state.tiles, (left, top, right, bottom), is_walled, images[ACCUMULATED], finest)
+        chain = chain_images_in(state.values, len(closed_in(state.tiles)))
+        mine = [images[ACCUMULATED], *chain]
+        self._accumulated.restore(state.tiles, (left, top, right, bottom), is_walled, mine, finest)
         if grid != self.grid:
             self._submap.release()
             self._submap = Submap(self.device, grid)

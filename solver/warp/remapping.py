@@ -144,7 +144,7 @@ class Remapping:
         """Plan the accumulated map's tiles anew that these levels move; how many there are."""
         is_held = self._frozen.held is not None
         for level in levels:
-            self._accumulated.take_sides(level.images)
+            self._accumulated.take_sides(level.images_at_edges)
         return self._accumulated.begin(*((level.field.get(), level.grid) for level in levels), is_held=is_held)
 
     def _gather(self, submap: Submap, is_weighed: bool) -> None:

@@ -14,7 +14,7 @@ from solver.state import State
 
 SUBMAPS = {"submap": "grid", "gathered": "gathered grid", "pending": "pending grid"}  # and where their grids are
 FACTOR, CLOSED, UNDONE = "factor ", "closed map ", "undone "  # and their numbers
-ACCUMULATED, SIZES = "accumulated map", "closed sizes"
+ACCUMULATED, SIZES, EDGES = "accumulated map", "closed sizes", "closed images"
 # Closed maps, each with what is undone of those before it counted as one more. With what is undone beside the
 # accumulated map, `seek.frag` then reads 16 textures, as many as OpenGL 3.3 promises a stage.
 MOST_CLOSED = 8
@@ -26,7 +26,6 @@ Images = tuple[float, float, float, float]
 
 OPEN: Images = (0.0, 0.0, 0.0, 0.0)
 GLIDING: Images = (1.0, 1.0, 1.0, 1.0)
-STICKING: Images = (-1.0, -1.0, -1.0, -1.0)
 
 
 class MapState(State):
@@ -115,9 +114,25 @@ def images_in(values: Mapping[str, np.ndarray], name: str) -> Images:
     Raises:
         ValueError: if they are none.
     """
-    numbers = np.asarray(values.get(f"{name} images", np.ones(4)))
-    if numbers.shape != (4,) or not np.isin(numbers, (-1.0, 1.0)).all():
-        raise ValueError(f"what lies beyond the edges of its {name} is missing")
+    return _images(values.get(f"{name} images", np.ones(4)), f"its {name}")
+
+
+def chain_images_in(values: Mapping[str, np.ndarray], count: int) -> list[Images]:
+    """The images of so many closed maps and of what is undone, as saved; without any, the accumulated map's.
+
+    Raises:
+        ValueError: if they are none.
+    """
+    rows = np.asarray(values.get(EDGES, [images_in(values, ACCUMULATED)] * count))
+    if len(rows) != count:
+        raise ValueError(f"what lies beyond the edges of its {count} closed maps is missing")
+    return [_images(row, "its closed maps") for row in rows]
+
+
+def _images(given: np.ndarray, whose: str) -> Images:
+    numbers = np.asarray(given)
+    if numbers.shape != (4,) or not np.isin(numbers, (-1.0, 0.0, 1.0)).all():
+        raise ValueError(f"what lies beyond the edges of {whose} is missing")
     left, right, top, bottom = numbers.tolist()
     return left, right, top, bottom
 

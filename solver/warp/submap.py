@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from operator import mul
 from typing import Any, NamedTuple
 
 from solver.gl.device import Device
@@ -78,6 +79,12 @@ class Level(NamedTuple):
     grid: Grid
     is_weighed: bool = False
     images: Images = GLIDING
+
+    @property
+    def images_at_edges(self) -> Images:
+        """What it says of what lies beyond the picture's edges: 0 of those that it does not reach."""
+        left, right, top, bottom = map(mul, self.images, self.grid.at_edge)
+        return left, right, top, bottom
 
 
 def window_of(grid: Grid) -> tuple[float, float, float, float]:

@@ -251,12 +251,15 @@ def test_where_the_fluid_sticks_the_edge_of_the_picture_stays(device: Device) ->
     assert np.abs(warp.read()).max() > 0.1
     assert np.abs(warp.at(top)).max() < 1e-6
     fluid.params = FluidParams()
+    ways = [np.abs(warp.at(top)[:, 0]).max()]
     for _ in range(12):
         warp.follow(fluid, 0.05)
+        ways.append(np.abs(warp.at(top)[:, 0]).max())
+    assert np.diff(ways) == pytest.approx(np.full(12, ways[-1] / 12), rel=0.1), "no jump where it begins to glide"
     there = warp.at(top)
     assert np.abs(there[:, 0]).max() > 0.05
     fluid.params = FluidParams(walls=Walls("none"))
-    for _ in range(12):
+    for _ in range(24):
         warp.follow(fluid, 0.05)
     assert warp.at(top) == pytest.approx(there, abs=1e-5)
     assert warp.statistics().folds == 0
@@ -959,11 +962,26 @@ def test_closed_maps_are_saved_and_come_back(device: Device) -> None:
         made.release()
 
 
+def test_a_map_of_more_texels_is_closed_later(device: Device) -> None:
+    """With four times the texels along a cell, at most half as often, and det J stays 1 within 5 % either way."""
+    grid, flow, points = Grid(48, 48), swirl((0.5, 0.5), 0.45), np.random.default_rng(0).uniform(0.36, 0.64, (4000, 2))
+    maps = [WarpMap(device, grid, (size, size)) for size in (192, 768)]
+    for _ in range(120):
+        for warp in maps:
+            warp.advance_prescribed(flow, 0.05)
+    few, many = (closed(warp) for warp in maps)
+    assert 1 <= many <= few / 2
+    least = [warp.determinants(points).min() for warp in maps]
+    assert min(least) > 0.95
+    for warp in maps:
+        warp.release()
+
+
 def test_closed_maps_of_a_large_map_have_as_many_texels_as_there_is_room_for(
     device: Device, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Room for two of 16 texels a cell: with half as many each way it does not fold either, and saved states go on."""
-    monkeypatch.setattr("solver.warp.accumulated.MOST_CLOSED_BYTES", 2 * 768 * 768 * 8)
+    """Room for one of 16 texels a cell: with half as many each way it does not fold either, and saved states go on."""
+    monkeypatch.setattr("solver.warp.accumulated.MOST_CLOSED_BYTES", 768 * 768 * 8)
     grid, flow = Grid(48, 48), swirl((0.5, 0.5), 0.45)
     warp, then, frozen = (WarpMap(device, grid, (768, 768)) for _ in range(3))
     frozen.hold(device.upload(np.eye(16, dtype=np.uint8) * 255))
@@ -975,10 +993,10 @@ def test_closed_maps_of_a_large_map_have_as_many_texels_as_there_is_room_for(
         for one in (warp, frozen):
             one.advance_prescribed(flow, 0.05)
     count = closed(warp)
-    assert count >= 4
+    assert count >= 2
     assert {tuple(size) for size in state.values["closed sizes"].tolist()} == {(384, 384), (768, 768)}
     beside = frozen.save()
-    assert beside.values["closed sizes"].tolist() == [[768, 768]] * 2, "in full beside what is held"
+    assert beside.values["closed sizes"].tolist() == [[768, 768]], "in full beside what is held"
     points = np.random.default_rng(0).random((4000, 2))
     right, down = (points - 0.5).T
     turn = -32 * np.clip(1 - (right**2 + down**2) / 0.45**2, 0, None) ** 4
@@ -992,7 +1010,7 @@ def test_closed_maps_of_a_large_map_have_as_many_texels_as_there_is_room_for(
     for _ in range(60):
         then.advance_prescribed(flow, 0.05)
     np.testing.assert_array_equal(then.read(), later)
-    for sizes in (np.full((2, 2), 384), np.full((count, 2), 999)):
+    for sizes in (np.full((count + 2, 2), 384), np.full((count, 2), 999)):
         with pytest.raises(ValueError, match="sizes of its closed maps"):
             template.with_arrays(device, state.arrays() | {"closed sizes": sizes})
     for made in (state, beside, template, resumed, warp, then, frozen):
