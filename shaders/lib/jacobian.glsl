@@ -46,15 +46,15 @@ void bend_by(int level, sampler2D submap, vec4 window, vec4 images, vec2 x, inou
     bend.jacobian = next * bend.jacobian;
 }
 
-// What A, or a closed map, does after that; gives its own determinant.
-float follow(sampler2D accumulated, vec2 x, inout Bend bend) {
-    vec2 density = vec2(textureSize(accumulated, 0)) / u_picture;
+// What A, or a closed map, does after that, of so many texels along the picture, from a corner on; gives its own determinant.
+float follow(sampler2D accumulated, vec2 texels, vec2 corner, vec2 x, inout Bend bend) {
+    vec2 density = texels / u_picture;
     mat2 slope;
 #if UNDONE > 0
     bend.from = bend.moved;
     bend.before = bend.jacobian;
 #endif
-    bend.moved += cubic_displacement(accumulated, (x + bend.moved) * density, u_edges, slope);
+    bend.moved += cubic_displacement(accumulated, (x + bend.moved) * density - corner, u_edges, slope);
     mat2 next = mat2(1.0) + mat2(slope[0] * density.x, slope[1] * density.y);
     bend.jacobian = next * bend.jacobian;
     float own = determinant(next);
@@ -67,19 +67,21 @@ void follow_accumulated(vec2 x, inout Bend bend) {
     ivec2 first = clamp(ivec2(floor((x + bend.moved) * density - 0.5)), ivec2(0), textureSize(u_accumulated, 0) - 2);
     for (int k = 0; k < 4; ++k) corners[k] = texelFetch(u_accumulated, first + ivec2(k % 2, k / 2), 0).rg * density;
     bend.between *= area_of(corners);
-    follow(u_accumulated, x, bend);
+    follow(u_accumulated, vec2(textureSize(u_accumulated, 0)), vec2(0.0), x, bend);
 }
 
-void follow_closed(sampler2D closed, vec2 x, inout Bend bend) {
+void follow_closed(sampler2D closed, bool is_boxed, vec2 corner, vec2 x, inout Bend bend) {
     bend.moved = within_picture(x, bend.moved);
-    bend.between *= follow(closed, x, bend);
+    corner = is_boxed ? corner : vec2(0.0);
+    bend.between *= follow(closed, texels_of(closed, is_boxed), corner, x, bend);
 }
 
 #if UNDONE > 0
-void undo(sampler2D undone, vec2 x, inout Bend bend) {
-    vec2 density = vec2(textureSize(undone, 0)) / u_picture;
+void undo(sampler2D undone, bool is_boxed, vec2 corner, vec2 x, inout Bend bend) {
+    vec2 density = texels_of(undone, is_boxed) / u_picture;
     mat2x4 slopes;
-    vec4 read = cubic_texels(undone, (x + bend.from) * density, u_edges, slopes);
+    corner = is_boxed ? corner : vec2(0.0);
+    vec4 read = cubic_texels(undone, (x + bend.from) * density - corner, u_edges, slopes);
     slopes = mat2x4(slopes[0] * density.x, slopes[1] * density.y) * bend.before;
     mat2 aside = mat2(slopes[0].rg, slopes[1].rg), bent = bend.jacobian - mat2(1.0);
     vec2 growing = vec2(slopes[0].b, slopes[1].b) * float(read.b > 0.0 && read.b < 1.0);
@@ -127,13 +129,17 @@ Bend bend_at(vec2 x) {
     bend_by(4, u_third, u_third_window, u_third_images, x, bend);
 #endif
     follow_accumulated(x, bend);
+#define GO_ON(closed, n, corner) follow_closed(closed, IS(BOXED, n), corner, x, bend);
+#define UNDO(undone, n, corner) undo(undone, IS(BOXED, n), corner, x, bend);
 #if UNDONE > 0
-#define FOLLOW(closed, number) if ((UNDONE >> number & 1) != 0) undo(closed, x, bend); else follow_closed(closed, x, bend);
+#define FOLLOW(closed, n, corner) if (IS(UNDONE, n)) UNDO(closed, n, corner) else GO_ON(closed, n, corner)
 #else
-#define FOLLOW(closed, number) follow_closed(closed, x, bend);
+#define FOLLOW(closed, n, corner) GO_ON(closed, n, corner)
 #endif
     THROUGH_CLOSED(FOLLOW)
 #undef FOLLOW
+#undef GO_ON
+#undef UNDO
 #if UNDONE > 0
     // Where nothing is undone, the determinant stays the product of the parts'. At a sharp edge the cubic leads on, by E,
     // also where the part T, kept in 0-1, is 0.

@@ -2,7 +2,7 @@
 //   D(x) = S(x) + A(x + S(x));   with LEVELS defined as 2 or 3, with the submaps that are still to be taken into A,
 //   D(x) = S + S2 + S3 + A, each where those before it have led; with CLOSED defined as 1 to 9, with so many fields after
 //   A, the last one closed first: closed maps, and where UNDONE has their bit, what the restore brush has taken away of all
-//   that follows. A place that is looked up in the next part is kept in the picture, and x + D(x) within u_limits, as all
+//   that follows. Where BOXED has their bit they are texels of A from u_corner_0 to u_corner_8 on, and 0 beyond. A place that is looked up in the next part is kept in the picture, and x + D(x) within u_limits, as all
 //   texels are: between them a polynomial exceeds them, and composed again and again that would grow without end.
 // u_submap, u_second, u_third, u_accumulated, u_closed_0 to u_closed_8: displacements, longer sides, and of what is undone
 // the part, 0-1, in the third component; u_window, u_second_window, u_third_window: left, top, width and height that the
@@ -38,60 +38,72 @@ uniform vec4 u_third_images;
 #ifndef UNDONE
 #define UNDONE 0
 #endif
-// THROUGH_CLOSED(GO) is GO(closed, number) of each closed map, the last one closed first: GLSL 3.30 has no array of samplers
+#ifndef BOXED
+#define BOXED 0
+#endif
+// THROUGH_CLOSED(GO) is GO(closed, number, corner) of each closed map, the last one closed first: GLSL 3.30 has no array of samplers
 // to go through.
 #define THROUGH_0(GO)
 #if CLOSED > 0
 uniform sampler2D u_closed_0;
-#define THROUGH_1(GO) GO(u_closed_0, 0) THROUGH_0(GO)
+uniform vec2 u_corner_0;
+#define THROUGH_1(GO) GO(u_closed_0, 0, u_corner_0) THROUGH_0(GO)
 #else
 #define THROUGH_1(GO) THROUGH_0(GO)
 #endif
 #if CLOSED > 1
 uniform sampler2D u_closed_1;
-#define THROUGH_2(GO) GO(u_closed_1, 1) THROUGH_1(GO)
+uniform vec2 u_corner_1;
+#define THROUGH_2(GO) GO(u_closed_1, 1, u_corner_1) THROUGH_1(GO)
 #else
 #define THROUGH_2(GO) THROUGH_1(GO)
 #endif
 #if CLOSED > 2
 uniform sampler2D u_closed_2;
-#define THROUGH_3(GO) GO(u_closed_2, 2) THROUGH_2(GO)
+uniform vec2 u_corner_2;
+#define THROUGH_3(GO) GO(u_closed_2, 2, u_corner_2) THROUGH_2(GO)
 #else
 #define THROUGH_3(GO) THROUGH_2(GO)
 #endif
 #if CLOSED > 3
 uniform sampler2D u_closed_3;
-#define THROUGH_4(GO) GO(u_closed_3, 3) THROUGH_3(GO)
+uniform vec2 u_corner_3;
+#define THROUGH_4(GO) GO(u_closed_3, 3, u_corner_3) THROUGH_3(GO)
 #else
 #define THROUGH_4(GO) THROUGH_3(GO)
 #endif
 #if CLOSED > 4
 uniform sampler2D u_closed_4;
-#define THROUGH_5(GO) GO(u_closed_4, 4) THROUGH_4(GO)
+uniform vec2 u_corner_4;
+#define THROUGH_5(GO) GO(u_closed_4, 4, u_corner_4) THROUGH_4(GO)
 #else
 #define THROUGH_5(GO) THROUGH_4(GO)
 #endif
 #if CLOSED > 5
 uniform sampler2D u_closed_5;
-#define THROUGH_6(GO) GO(u_closed_5, 5) THROUGH_5(GO)
+uniform vec2 u_corner_5;
+#define THROUGH_6(GO) GO(u_closed_5, 5, u_corner_5) THROUGH_5(GO)
 #else
 #define THROUGH_6(GO) THROUGH_5(GO)
 #endif
 #if CLOSED > 6
 uniform sampler2D u_closed_6;
-#define THROUGH_7(GO) GO(u_closed_6, 6) THROUGH_6(GO)
+uniform vec2 u_corner_6;
+#define THROUGH_7(GO) GO(u_closed_6, 6, u_corner_6) THROUGH_6(GO)
 #else
 #define THROUGH_7(GO) THROUGH_6(GO)
 #endif
 #if CLOSED > 7
 uniform sampler2D u_closed_7;
-#define THROUGH_8(GO) GO(u_closed_7, 7) THROUGH_7(GO)
+uniform vec2 u_corner_7;
+#define THROUGH_8(GO) GO(u_closed_7, 7, u_corner_7) THROUGH_7(GO)
 #else
 #define THROUGH_8(GO) THROUGH_7(GO)
 #endif
 #if CLOSED > 8
 uniform sampler2D u_closed_8;
-#define THROUGH_CLOSED(GO) GO(u_closed_8, 8) THROUGH_8(GO)
+uniform vec2 u_corner_8;
+#define THROUGH_CLOSED(GO) GO(u_closed_8, 8, u_corner_8) THROUGH_8(GO)
 #else
 #define THROUGH_CLOSED(GO) THROUGH_8(GO)
 #endif
@@ -185,22 +197,31 @@ vec4 accumulated_texels(sampler2D accumulated, vec2 place) {
 #endif
 }
 
-// Texels of a closed map, or of what is undone, for each of A's.
-vec2 texels_of(sampler2D closed) { return vec2(textureSize(closed, 0)) / vec2(textureSize(u_accumulated, 0)); }
+// Texels of a closed map, or of what is undone, along the picture: those of A if it is a box of them.
+vec2 texels_of(sampler2D closed, bool is_boxed) {
+    return vec2(is_boxed ? textureSize(u_accumulated, 0) : textureSize(closed, 0));
+}
+
+// What it holds at a place in A's texels. The outermost texels of a box are 0 where they are not the picture's, and so is all
+// beyond, with images or without.
+vec4 closed_texels(sampler2D closed, bool is_boxed, vec2 corner, vec2 place) {
+    vec2 there = is_boxed ? place - corner : place * (texels_of(closed, false) / vec2(textureSize(u_accumulated, 0)));
+    return accumulated_texels(closed, there);
+}
 
 // Looks a closed map up where x has been led: x + moved + more, kept in the picture. `place` is x + moved in A's texels; it
 // is moved along and not computed anew, so that it stays on its texel to the bit where nothing has moved.
-void follow(sampler2D closed, vec2 x, inout vec2 moved, inout vec2 more, inout vec2 place) {
+void follow(sampler2D closed, bool is_boxed, vec2 corner, vec2 x, inout vec2 moved, inout vec2 more, inout vec2 place) {
     vec2 led = within_picture(x, moved + more) - moved;
     moved += led;
     place += led * vec2(textureSize(u_accumulated, 0)) / u_picture;
-    more = accumulated_texels(closed, place * texels_of(closed)).rg;
+    more = closed_texels(closed, is_boxed, corner, place).rg;
 }
 
 // What the restore brush has undone at a place in A's texels: a way (E), and the part of what follows (T). E is read as A is,
 // so that beneath the brush they add up to what A was also between texels.
-vec3 undone_at(sampler2D undone, vec2 place) {
-    vec3 read = accumulated_texels(undone, place * texels_of(undone)).rgb;
+vec3 undone_at(sampler2D undone, bool is_boxed, vec2 corner, vec2 place) {
+    vec3 read = closed_texels(undone, is_boxed, corner, place).rgb;
     return vec3(read.rg, clamp(read.b, 0.0, 1.0));
 }
 
@@ -218,10 +239,13 @@ void undo(vec3 undone, vec2 moved, inout vec2 more, inout vec2 back, inout float
 vec2 displacement_from(vec2 x, vec2 moved, vec2 place) {
     vec2 more = accumulated_texels(u_accumulated, place).rg, back = vec2(0.0);
     float part = 1.0;
-#define UNDO(undone) undo(undone_at(undone, place), moved, more, back, part)
-#define FOLLOW(closed, number) if ((UNDONE >> number & 1) != 0) UNDO(closed); else follow(closed, x, moved, more, place);
+#define IS(kind, n) (kind >> n & 1) != 0
+#define UNDO(undone, n, corner) undo(undone_at(undone, IS(BOXED, n), corner, place), moved, more, back, part);
+#define GO_ON(closed, n, corner) follow(closed, IS(BOXED, n), corner, x, moved, more, place);
+#define FOLLOW(closed, n, corner) if (IS(UNDONE, n)) UNDO(closed, n, corner) else GO_ON(closed, n, corner)
     THROUGH_CLOSED(FOLLOW)
 #undef FOLLOW
+#undef GO_ON
 #undef UNDO
     moved += more;
 #if UNDONE > 0

@@ -57,7 +57,7 @@ void main() {
 #endif
     place += moved / texel;
 #ifdef CARRY
-    out_displacement = vec4(undone_at(u_undone, place), 0.0);
+    out_displacement = vec4(undone_at(u_undone, false, vec2(0.0), place), 0.0);
 #else
     out_displacement = from + displacement_from(x, moved, place);
 #endif

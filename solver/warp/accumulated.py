@@ -29,6 +29,8 @@ from solver.warp.state import (
     STICKING,
     UNDONE,
     UNDONE_COMPONENTS,
+    WHOLE,
+    Corner,
     Images,
     closed_in,
 )
@@ -42,6 +44,7 @@ STEEPEST = 6.0  # largest |grad A| of a map that is not closed: one that stretch
 # one, the interpolation may as well be folded.
 LEAST_EVEN = 0.5
 CLOSED_TEXELS = 8  # along a cell, at least, of a closed map that has fewer texels than A: with so many none folds
+RIM = 6  # texels of nothing around a box of them: as many as the quintic reads along a side
 
 Limits = tuple[float, float, float, float]
 
@@ -72,13 +75,20 @@ def map_size(grid: Grid, picture: tuple[int, int], largest: int) -> tuple[int, i
     return across * width, down * height
 
 
+class ClosedMap(TiledField):
+    """What was the accumulated map, or undone beside it; `corner`: where it begins, if it is a box of its texels."""
+
+    corner: Corner | None = None
+
+
 class AccumulatedMap:
     """A displacement of the whole picture, RG32F, longer sides, redrawn tile by tile where something has moved.
 
     Before it becomes too steep for its texels it is closed, and a new one of nothing begins; a place is looked up in
     the new one first, then in the closed ones, the last one closed first. These have fewer texels where as many would
-    leave no room for `MOST_CLOSED`, but no fewer than `CLOSED_TEXELS` for a cell that moved them. Once there are as
-    many as there may be, it goes on however steep it is. What the restore brush takes away of the closed ones is kept
+    leave no room for `MOST_CLOSED`, but no fewer than `CLOSED_TEXELS` for a cell that moved them; where there is no
+    room for the whole picture then, they are a box of it, around the tiles that have moved. Once there are as many as
+    there may be, it goes on however steep it is. What the restore brush takes away of the closed ones is kept
     beside it, is moved and closed with it, and comes before it in the list.
 
     Args:
@@ -100,13 +110,13 @@ class AccumulatedMap:
         self.device = device
         self.size = size
         self.extent = extent
-        self.closed: list[TiledField] = []
+        self.closed: list[ClosedMap] = []
         self._steepness = Steepness(device, size, "accumulated map", TILE=TILE)
         self._evenness = Evenness(device, size, self._steepness.blocks)
-        self.now = TiledField(device, size, 2, "accumulated map")
-        self._next = TiledField(device, size, 2, "accumulated map, anew")
-        self.undone: TiledField | None = None
-        self._next_undone: TiledField | None = None
+        self.now = ClosedMap(device, size, 2, "accumulated map")
+        self._next = ClosedMap(device, size, 2, "accumulated map, anew")
+        self.undone: ClosedMap | None = None
+        self._next_undone: ClosedMap | None = None
         self._tiles = self.now.kind.regions
         self._stale = set[Region]()  # tiles in which `_next` holds something older than `now`
         self._moved: list[Region] = []  # tiles to be drawn anew
@@ -155,13 +165,16 @@ class AccumulatedMap:
         """The defines of `lib/warp.glsl` for it and the closed maps."""
         chain = self._chain
         undone = sum(1 << number for number, field in enumerate(chain) if _is_undone(field))
-        return {name: number for name, number in (("CLOSED", len(chain)), ("UNDONE", undone)) if number}
+        boxed = sum(1 << number for number, field in enumerate(chain) if field.corner is not None)
+        kinds = ("CLOSED", len(chain)), ("UNDONE", undone), ("BOXED", boxed)
+        return {name: number for name, number in kinds if number}
 
     def inputs(self) -> dict[str, Any]:
         """The inputs of `lib/warp.glsl` for it and the closed maps."""
         return (
             self.own()
             | {f"closed_{number}": field for number, field in enumerate(self._chain)}
+            | {f"corner_{number}": field.corner for number, field in enumerate(self._chain) if field.corner is not None}
             | {"limits": self.limits}
         )
 
@@ -181,14 +194,14 @@ class AccumulatedMap:
         self.images = left, right, top, bottom
 
     @property
-    def _chain(self) -> list[TiledField]:
+    def _chain(self) -> list[ClosedMap]:
         """What a place is looked up in after the map, the last one first."""
         return self.closed if self.undone is None else [*self.closed, self.undone]
 
     @property
-    def _pairs(self) -> list[tuple[TiledField, TiledField, dict[str, Field]]]:
+    def _pairs(self) -> list[tuple[ClosedMap, ClosedMap, dict[str, Field]]]:
         """The map and what is undone, the field each is redrawn into, and what `Draw` is told."""
-        pairs: list[tuple[TiledField, TiledField, dict[str, Field]]] = [(self.now, self._next, {})]
+        pairs: list[tuple[ClosedMap, ClosedMap, dict[str, Field]]] = [(self.now, self._next, {})]
         if self.undone is not None and self._next_undone is not None:
             pairs.append((self.undone, self._next_undone, {"undone": self.undone}))
         return pairs
@@ -221,19 +234,31 @@ class AccumulatedMap:
         return True
 
     @property
-    def _closed_size(self) -> tuple[int, int]:
-        """(width, height) in texels that it has once it is closed."""
+    def _closed_region(self) -> tuple[Region, int] | None:
+        """The texels of it that are kept once it is closed, and of how many along a side one is made; None: no room."""
         least = (self.finest * n / side / CLOSED_TEXELS for n, side in zip(self.size, self.extent, strict=True))
         fitting = math.sqrt(self.now.nbytes * MOST_CLOSED / MOST_CLOSED_BYTES)
         times = max(min(math.ceil(fitting), *map(math.floor, least)), 1)
-        return -(-self.size[0] // times), -(-self.size[1] // times)
+        for region, each in (((0, 0, *self.size), times), (self._box, 1)):
+            width, height = (-(-side // each) for side in region[2:])
+            own = sum(field.components for field, _, _ in self._pairs) * 4 * width * height
+            if own + sum(field.nbytes for field in self.closed) <= MOST_CLOSED_BYTES:
+                return region, each
+        return None
+
+    @property
+    def _box(self) -> Region:
+        """The texels of it that are not nothing, and `RIM` around them."""
+        tiles = np.array([tile for field, _, _ in self._pairs for tile in field.tiles] or [(0, 0, 1, 1)])
+        low = np.maximum(tiles[:, :2].min(axis=0) - RIM, 0)
+        high = np.minimum((tiles[:, :2] + tiles[:, 2:]).max(axis=0) + RIM, self.size)
+        (left, top), (right, bottom) = low.tolist(), high.tolist()
+        return left, top, right - left, bottom - top
 
     @property
     def may_close(self) -> bool:
         """True if there is room for another closed map."""
-        width, height = self._closed_size
-        own = sum(field.components for field, _, _ in self._pairs) * 4 * width * height
-        return len(self._chain) < MOST_CLOSED and own + sum(field.nbytes for field in self.closed) <= MOST_CLOSED_BYTES
+        return len(self._chain) < MOST_CLOSED and self._closed_region is not None
 
     def _look(self, tiles: list[Region]) -> None:
         """Look at how steep tiles of `_next` are, if another map may be closed."""
@@ -255,24 +280,36 @@ class AccumulatedMap:
     def close(self) -> None:
         """Keep it as it is, and go on with a map of nothing; what was planned is forgotten."""
         self.forget()
-        size, steep = self._closed_size, [self.now] if self.undone is None else [self.undone, self.now]
-        if size == self.size:
+        assert self._closed_region is not None
+        (region, times), steep = self._closed_region, [self.now] if self.undone is None else [self.undone, self.now]
+        if region[2:] == self.size and times == 1:
             self.closed += steep
             self.now, self.undone = self._blank(2, "accumulated map"), None
         else:
             for now in steep:
-                self.closed.append(closed := self._blank(now.components, "closed map", size))
-                resample = self.device.pass_("warp/resample.frag", CUBIC=1)
-                regions = [_resampled(tile, self.size, size) for tile in now.tiles]
-                resample(
-                    closed, region=regions, displacement=now, images=self.edges, origin=(0.0, 0.0), step=closed.texel
-                )
+                self.closed.append(self._box_of(now, region) if times == 1 else self._coarser(now, times))
             # Clearing the map itself would copy at once what saves hold of it.
             self.now, self._next = self._next, self.now
             self.now.clear()
         self._drop_undone()
         self.finest = 1.0
         self._stale = set(self._next.tiles)  # cleared with the next remap, a few in each step
+
+    def _coarser(self, now: ClosedMap, times: int) -> ClosedMap:
+        """The same with one texel for so many along a side."""
+        size = -(-self.size[0] // times), -(-self.size[1] // times)
+        closed = self._blank(now.components, "closed map", size)
+        resample = self.device.pass_("warp/resample.frag", CUBIC=1)
+        regions = [_resampled(tile, self.size, size) for tile in now.tiles]
+        resample(closed, region=regions, displacement=now, images=self.edges, origin=(0.0, 0.0), step=closed.texel)
+        return closed
+
+    def _box_of(self, now: ClosedMap, region: Region) -> ClosedMap:
+        """Its texels in a region, beyond which it is nothing."""
+        x, y, width, height = region
+        closed = self._blank(now.components, "closed map", (width, height), (x, y))
+        self.device.pass_("gl/copy.frag")(closed, field=now, offset=(x, y))
+        return closed
 
     def forget(self) -> None:
         """Drop what is planned."""
@@ -297,8 +334,12 @@ class AccumulatedMap:
         fields = (self._blank(UNDONE_COMPONENTS, f"what is undone{more}") for more in ("", ", anew"))
         self.undone, self._next_undone = fields
 
-    def _blank(self, components: int, label: str, size: tuple[int, int] | None = None) -> TiledField:
-        return TiledField(self.device, size or self.size, components, label)
+    def _blank(
+        self, components: int, label: str, size: tuple[int, int] | None = None, corner: Corner | None = None
+    ) -> ClosedMap:
+        blank = ClosedMap(self.device, size or self.size, components, label)
+        blank.corner = corner
+        return blank
 
     def set(self, draw: Callable[[Field], None], limits: Limits) -> None:
         """Draw all of it anew, with places within these limits, and no closed maps; what was planned is forgotten."""
@@ -309,7 +350,7 @@ class AccumulatedMap:
         self.limits, self.is_walled = limits, False
         self.finest = 0.0
 
-    def saved(self) -> dict[str, TiledField]:
+    def saved(self) -> dict[str, ClosedMap]:
         """The fields by name, to be saved."""
         names = [f"{UNDONE if _is_undone(field) else CLOSED}{number}" for number, field in enumerate(self._chain)]
         return {ACCUMULATED: self.now} | dict(zip(names, self._chain, strict=True))
@@ -319,18 +360,30 @@ class AccumulatedMap:
         """(width, height) in texels of the closed maps, and of what is undone, as `saved` names them."""
         return [field.size for field in self._chain]
 
+    @property
+    def corners(self) -> list[Corner]:
+        """Where these begin; `WHOLE` of those all over the picture."""
+        return [WHOLE if field.corner is None else field.corner for field in self._chain]
+
     def restore(
-        self, saved: dict[str, SavedTiles], limits: Limits, is_walled: bool, images: Images, finest: float
+        self,
+        saved: dict[str, SavedTiles],
+        corners: list[Corner | None],
+        limits: Limits,
+        is_walled: bool,
+        images: Images,
+        finest: float,
     ) -> None:
         """Go back to what `saved` gave, as it was then, with all else of then; what was planned is forgotten."""
         self.forget()
         self._stale.update(self.now.restore(saved[ACCUMULATED]))
         names = closed_in(saved)
         undone = saved[names.pop()] if names and names[-1].startswith(UNDONE) else None
-        kinds = [saved[name].kind for name in names]
-        same = sum(1 for _ in takewhile(lambda pair: pair[0].kind == pair[1], zip(self.closed, kinds, strict=False)))
+        kinds = [(saved[name].kind, corner) for name, corner in zip(names, corners, strict=False)]
+        mine = ((field.kind, field.corner) for field in self.closed)
+        same = sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(mine, kinds, strict=False)))
         self._open(same)
-        self.closed += [self._blank(kind.components, "closed map", kind.size) for kind in kinds[same:]]
+        self.closed += [self._blank(kind.components, "closed map", kind.size, at) for kind, at in kinds[same:]]
         for name, field in zip(names, self.closed, strict=True):
             field.restore(saved[name])
         if undone is None:
@@ -371,7 +424,7 @@ class AccumulatedMap:
         self.undone = self._next_undone = None
 
 
-def _is_undone(field: TiledField) -> bool:
+def _is_undone(field: ClosedMap) -> bool:
     return field.components == UNDONE_COMPONENTS
 
 

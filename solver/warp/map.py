@@ -31,7 +31,22 @@ from solver.warp.factors import Factors
 from solver.warp.frozen import Frozen
 from solver.warp.prescribed import traced
 from solver.warp.remapping import Remapping
-from solver.warp.state import ACCUMULATED, FACTOR, OPEN, SIZES, SUBMAPS, Images, MapState, grid_in, images_in, values_of
+from solver.warp.state import (
+    ACCUMULATED,
+    CORNERS,
+    FACTOR,
+    OPEN,
+    SIZES,
+    SUBMAPS,
+    WHOLE,
+    Images,
+    MapState,
+    closed_in,
+    corners_in,
+    grid_in,
+    images_in,
+    values_of,
+)
 from solver.warp.submap import STEEPEST, Level, Submap, away_from_held, defines_of, images_of, inputs_of, window_of
 
 CHECK_EVERY = 2  # steps between two looks at how far the map is bent: a quick push bends it by 1 in two
@@ -344,6 +359,8 @@ class WarpMap:
         values: dict[str, Any] = {"steps": self._steps, "limits": accumulated.limits, "walled": accumulated.is_walled}
         values[f"{ACCUMULATED} images"] = accumulated.images
         values |= {"finest": accumulated.finest} | ({SIZES: accumulated.sizes} if accumulated.sizes else {})
+        if any(corner != WHOLE for corner in accumulated.corners):
+            values[CORNERS] = accumulated.corners
         values |= {"grid": values_of(self.grid), "settled": self._is_settled, "submap images": self._submap.images}
         fields |= self.factors.save()
         for name, level in self._remapping.saved():
@@ -370,7 +387,10 @@ class WarpMap:
         left, top, right, bottom = state.values["limits"].tolist()
         is_walled = bool(state.values.get("walled", True))
         finest = float(state.values.get("finest", 0.0))
-        self._accumulated.restore(state.tiles, (left, top, right, bottom), is_walled, images[ACCUMULATED], finest)
+        corners = corners_in(state.values, len(closed_in(state.tiles)))
+        self._accumulated.restore(
+            state.tiles, corners, (left, top, right, bottom), is_walled, images[ACCUMULATED], finest
+        )
         if grid != self.grid:
             self._submap.release()
             self._submap = Submap(self.device, grid)

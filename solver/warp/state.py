@@ -14,7 +14,7 @@ from solver.state import State
 
 SUBMAPS = {"submap": "grid", "gathered": "gathered grid", "pending": "pending grid"}  # and where their grids are
 FACTOR, CLOSED, UNDONE = "factor ", "closed map ", "undone "  # and their numbers
-ACCUMULATED, SIZES = "accumulated map", "closed sizes"
+ACCUMULATED, SIZES, CORNERS = "accumulated map", "closed sizes", "closed corners"
 # Closed maps, each with what is undone of those before it counted as one more. With what is undone beside the
 # accumulated map, `seek.frag` then reads 16 textures, as many as OpenGL 3.3 promises a stage.
 MOST_CLOSED = 8
@@ -23,6 +23,11 @@ UNDONE_COMPONENTS = 4  # of what is undone: three, and one more as OpenGL 3.3 dr
 
 Images = tuple[float, float, float, float]
 """What lies beyond the left, right, top and bottom side: `images` of `lib/displacement.glsl`."""
+
+Corner = tuple[int, int]
+"""The first texel of the accumulated map that a closed one has, if it is a box of it."""
+
+WHOLE: Corner = (-1, -1)  # where a state tells of one all over the picture
 
 OPEN: Images = (0.0, 0.0, 0.0, 0.0)
 GLIDING: Images = (1.0, 1.0, 1.0, 1.0)
@@ -61,7 +66,9 @@ class MapState(State):
             closed = closed_in(name.removesuffix("/places") for name in arrays if name.endswith("/places"))
             if len(closed) - (closed[-1:] != [] and closed[-1].startswith(UNDONE)) > MOST_CLOSED:
                 raise ValueError(f"its map has {len(closed)} closed ones, more than there may be")
-            for name, size in zip(closed, _sizes(arrays, len(closed), accumulated.kind.size), strict=True):
+            sizes = _sizes(arrays, len(closed), accumulated.kind.size)
+            _check_corners(arrays, sizes, accumulated.kind.size)
+            for name, size in zip(closed, sizes, strict=True):
                 components = UNDONE_COMPONENTS if name.startswith(UNDONE) else 2
                 tiles[name] = SavedTiles.nothing(accumulated.kind._replace(size=size, components=components))
             for name, kind in held_kinds(accumulated.kind.size).items():
@@ -83,6 +90,28 @@ def _sizes(arrays: Mapping[str, np.ndarray], count: int, largest: tuple[int, int
     if sizes.shape != (count, 2) or ((sizes < 1) | (sizes > largest)).any():
         raise ValueError("the sizes of its closed maps are missing")
     return [(int(width), int(height)) for width, height in sizes]
+
+
+def _check_corners(arrays: Mapping[str, np.ndarray], sizes: list[tuple[int, int]], largest: tuple[int, int]) -> None:
+    """Raise `ValueError` if closed maps of these sizes do not lie in the map where they are told to."""
+    corners = corners_in(arrays, len(sizes))
+    if any(
+        corner is not None and (min(corner) < 0 or (np.add(corner, size) > largest).any())
+        for corner, size in zip(corners, sizes, strict=True)
+    ):
+        raise ValueError("the corners of its closed maps are missing")
+
+
+def corners_in(values: Mapping[str, np.ndarray], count: int) -> list[Corner | None]:
+    """Of so many closed maps, where they begin; None of those all over the picture.
+
+    Raises:
+        ValueError: if they are not told of each.
+    """
+    corners = np.asarray(values.get(CORNERS, np.full((count, 2), WHOLE[0])))
+    if corners.shape != (count, 2) or corners.dtype.kind not in "iu":
+        raise ValueError("the corners of its closed maps are missing")
+    return [None if (x, y) == WHOLE else (x, y) for x, y in corners.tolist()]
 
 
 def closed_in(names: Iterable[str]) -> list[str]:
