@@ -1037,7 +1037,7 @@ def test_closed_maps_without_room_for_the_picture_are_boxes_of_it(
         one.restore(moment)
         one.advance_prescribed(flows[1], 0.02)
         later.append(one.read((300, 200)))
-    np.testing.assert_array_equal(*later)
+    np.testing.assert_array_equal(later[0], later[1])
     for corners in (np.full_like(state.values["closed corners"], 700), np.zeros((1, 2), int), np.full((3, 2), 0.5)):
         with pytest.raises(ValueError, match="corners of its closed maps"):
             template.with_arrays(device, state.arrays() | {"closed corners": corners})
