@@ -47,14 +47,14 @@ void bend_by(int level, sampler2D submap, vec4 window, vec4 images, vec2 x, inou
 }
 
 // What A, or a closed map, does after that; gives its own determinant.
-float follow(sampler2D accumulated, vec4 edges, vec2 x, inout Bend bend) {
-    vec2 density = vec2(textureSize(accumulated, 0)) / u_picture;
+float follow(sampler2D accumulated, vec4 box, vec4 edges, vec2 x, inout Bend bend) {
+    vec2 texels = vec2(textureSize(u_accumulated, 0)) / u_picture, density = texels * box.zw;
     mat2 slope;
 #if UNDONE > 0
     bend.from = bend.moved;
     bend.before = bend.jacobian;
 #endif
-    bend.moved += cubic_displacement(accumulated, (x + bend.moved) * density, edges, slope);
+    bend.moved += cubic_displacement(accumulated, ((x + bend.moved) * texels - box.xy) * box.zw, edges, slope);
     mat2 next = mat2(1.0) + mat2(slope[0] * density.x, slope[1] * density.y);
     bend.jacobian = next * bend.jacobian;
     float own = determinant(next);
@@ -67,19 +67,19 @@ void follow_accumulated(vec2 x, inout Bend bend) {
     ivec2 first = clamp(ivec2(floor((x + bend.moved) * density - 0.5)), ivec2(0), textureSize(u_accumulated, 0) - 2);
     for (int k = 0; k < 4; ++k) corners[k] = texelFetch(u_accumulated, first + ivec2(k % 2, k / 2), 0).rg * density;
     bend.between *= area_of(corners);
-    follow(u_accumulated, u_edges, x, bend);
+    follow(u_accumulated, vec4(0.0, 0.0, 1.0, 1.0), u_edges, x, bend);
 }
 
-void follow_closed(sampler2D closed, vec4 edges, vec2 x, inout Bend bend) {
+void follow_closed(sampler2D closed, vec4 box, vec4 edges, vec2 x, inout Bend bend) {
     bend.moved = within_picture(x, bend.moved);
-    bend.between *= follow(closed, edges, x, bend);
+    bend.between *= follow(closed, box, edges, x, bend);
 }
 
 #if UNDONE > 0
-void undo(sampler2D undone, vec4 edges, vec2 x, inout Bend bend) {
-    vec2 density = vec2(textureSize(undone, 0)) / u_picture;
+void undo(sampler2D undone, vec4 box, vec4 edges, vec2 x, inout Bend bend) {
+    vec2 texels = vec2(textureSize(u_accumulated, 0)) / u_picture, density = texels * box.zw;
     mat2x4 slopes;
-    vec4 read = cubic_texels(undone, (x + bend.from) * density, edges, slopes);
+    vec4 read = cubic_texels(undone, ((x + bend.from) * texels - box.xy) * box.zw, edges, slopes);
     slopes = mat2x4(slopes[0] * density.x, slopes[1] * density.y) * bend.before;
     mat2 aside = mat2(slopes[0].rg, slopes[1].rg), bent = bend.jacobian - mat2(1.0);
     vec2 growing = vec2(slopes[0].b, slopes[1].b) * float(read.b > 0.0 && read.b < 1.0);
@@ -127,13 +127,17 @@ Bend bend_at(vec2 x) {
     bend_by(4, u_third, u_third_window, u_third_images, x, bend);
 #endif
     follow_accumulated(x, bend);
+#define UNDO(closed, box, edges) undo(closed, box, edges, x, bend)
+#define GO_ON(closed, box, edges) follow_closed(closed, box, edges, x, bend)
 #if UNDONE > 0
-#define FOLLOW(closed, edges, n) if (IS_UNDONE(n)) undo(closed, edges, x, bend); else follow_closed(closed, edges, x, bend);
+#define FOLLOW(closed, box, edges, n) if (IS_UNDONE(n)) UNDO(closed, box, edges); else GO_ON(closed, box, edges);
 #else
-#define FOLLOW(closed, edges, number) follow_closed(closed, edges, x, bend);
+#define FOLLOW(closed, box, edges, n) GO_ON(closed, box, edges);
 #endif
     THROUGH_CLOSED(FOLLOW)
 #undef FOLLOW
+#undef GO_ON
+#undef UNDO
 #if UNDONE > 0
     // Where nothing is undone, the determinant stays the product of the parts'. At a sharp edge the cubic leads on, by E,
     // also where the part T, kept in 0-1, is 0.

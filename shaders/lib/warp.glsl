@@ -4,6 +4,7 @@
 //   A, the last one closed first: closed maps, and where UNDONE has their bit, what the restore brush has taken away of all
 //   that follows. A place that is looked up in the next part is kept in the picture, and x + D(x) within u_limits, as all
 //   texels are: between them a polynomial exceeds them, and composed again and again that would grow without end.
+// u_box_0 to u_box_8: where a closed map begins, in texels of A, and its own texels for each of these.
 // u_submap, u_second, u_third, u_accumulated, u_closed_0 to u_closed_8: displacements, longer sides, and of what is undone
 // the part, 0-1, in the third component; u_window, u_second_window, u_third_window: left, top, width and height that the
 // submaps cover, u_picture: width and height of the picture, u_limits: left, top, right, bottom, longer sides; u_images,
@@ -39,69 +40,78 @@ uniform vec4 u_third_images;
 #define UNDONE 0
 #endif
 #define IS_UNDONE(number) ((UNDONE >> number & 1) != 0)
-// THROUGH_CLOSED(GO) is GO(closed, edges, number) of each closed map, the last one closed first: GLSL 3.30 has no array of samplers
-// to go through.
+// THROUGH_CLOSED(GO) is GO(closed, box, edges, number) of each closed map, the last one closed first: GLSL 3.30 has no array
+// of samplers to go through.
 #define THROUGH_0(GO)
 #if CLOSED > 0
 uniform sampler2D u_closed_0;
+uniform vec4 u_box_0;
 uniform vec4 u_edges_0;
-#define THROUGH_1(GO) GO(u_closed_0, u_edges_0, 0) THROUGH_0(GO)
+#define THROUGH_1(GO) GO(u_closed_0, u_box_0, u_edges_0, 0) THROUGH_0(GO)
 #else
 #define THROUGH_1(GO) THROUGH_0(GO)
 #endif
 #if CLOSED > 1
 uniform sampler2D u_closed_1;
+uniform vec4 u_box_1;
 uniform vec4 u_edges_1;
-#define THROUGH_2(GO) GO(u_closed_1, u_edges_1, 1) THROUGH_1(GO)
+#define THROUGH_2(GO) GO(u_closed_1, u_box_1, u_edges_1, 1) THROUGH_1(GO)
 #else
 #define THROUGH_2(GO) THROUGH_1(GO)
 #endif
 #if CLOSED > 2
 uniform sampler2D u_closed_2;
+uniform vec4 u_box_2;
 uniform vec4 u_edges_2;
-#define THROUGH_3(GO) GO(u_closed_2, u_edges_2, 2) THROUGH_2(GO)
+#define THROUGH_3(GO) GO(u_closed_2, u_box_2, u_edges_2, 2) THROUGH_2(GO)
 #else
 #define THROUGH_3(GO) THROUGH_2(GO)
 #endif
 #if CLOSED > 3
 uniform sampler2D u_closed_3;
+uniform vec4 u_box_3;
 uniform vec4 u_edges_3;
-#define THROUGH_4(GO) GO(u_closed_3, u_edges_3, 3) THROUGH_3(GO)
+#define THROUGH_4(GO) GO(u_closed_3, u_box_3, u_edges_3, 3) THROUGH_3(GO)
 #else
 #define THROUGH_4(GO) THROUGH_3(GO)
 #endif
 #if CLOSED > 4
 uniform sampler2D u_closed_4;
+uniform vec4 u_box_4;
 uniform vec4 u_edges_4;
-#define THROUGH_5(GO) GO(u_closed_4, u_edges_4, 4) THROUGH_4(GO)
+#define THROUGH_5(GO) GO(u_closed_4, u_box_4, u_edges_4, 4) THROUGH_4(GO)
 #else
 #define THROUGH_5(GO) THROUGH_4(GO)
 #endif
 #if CLOSED > 5
 uniform sampler2D u_closed_5;
+uniform vec4 u_box_5;
 uniform vec4 u_edges_5;
-#define THROUGH_6(GO) GO(u_closed_5, u_edges_5, 5) THROUGH_5(GO)
+#define THROUGH_6(GO) GO(u_closed_5, u_box_5, u_edges_5, 5) THROUGH_5(GO)
 #else
 #define THROUGH_6(GO) THROUGH_5(GO)
 #endif
 #if CLOSED > 6
 uniform sampler2D u_closed_6;
+uniform vec4 u_box_6;
 uniform vec4 u_edges_6;
-#define THROUGH_7(GO) GO(u_closed_6, u_edges_6, 6) THROUGH_6(GO)
+#define THROUGH_7(GO) GO(u_closed_6, u_box_6, u_edges_6, 6) THROUGH_6(GO)
 #else
 #define THROUGH_7(GO) THROUGH_6(GO)
 #endif
 #if CLOSED > 7
 uniform sampler2D u_closed_7;
+uniform vec4 u_box_7;
 uniform vec4 u_edges_7;
-#define THROUGH_8(GO) GO(u_closed_7, u_edges_7, 7) THROUGH_7(GO)
+#define THROUGH_8(GO) GO(u_closed_7, u_box_7, u_edges_7, 7) THROUGH_7(GO)
 #else
 #define THROUGH_8(GO) THROUGH_7(GO)
 #endif
 #if CLOSED > 8
 uniform sampler2D u_closed_8;
+uniform vec4 u_box_8;
 uniform vec4 u_edges_8;
-#define THROUGH_CLOSED(GO) GO(u_closed_8, u_edges_8, 8) THROUGH_8(GO)
+#define THROUGH_CLOSED(GO) GO(u_closed_8, u_box_8, u_edges_8, 8) THROUGH_8(GO)
 #else
 #define THROUGH_CLOSED(GO) THROUGH_8(GO)
 #endif
@@ -195,22 +205,25 @@ vec4 accumulated_texels(sampler2D accumulated, vec2 place, vec4 edges) {
 #endif
 }
 
-// Texels of a closed map, or of what is undone, for each of A's.
-vec2 texels_of(sampler2D closed) { return vec2(textureSize(closed, 0)) / vec2(textureSize(u_accumulated, 0)); }
+// A closed map, or what is undone, at a place in A's texels. Where its box ends within the picture its outermost texels are
+// 0, and so is all beyond.
+vec4 closed_texels(sampler2D closed, vec4 box, vec4 edges, vec2 place) {
+    return accumulated_texels(closed, (place - box.xy) * box.zw, edges);
+}
 
 // Looks a closed map up where x has been led: x + moved + more, kept in the picture. `place` is x + moved in A's texels; it
 // is moved along and not computed anew, so that it stays on its texel to the bit where nothing has moved.
-void follow(sampler2D closed, vec4 edges, vec2 x, inout vec2 moved, inout vec2 more, inout vec2 place) {
+void follow(sampler2D closed, vec4 box, vec4 edges, vec2 x, inout vec2 moved, inout vec2 more, inout vec2 place) {
     vec2 led = within_picture(x, moved + more) - moved;
     moved += led;
     place += led * vec2(textureSize(u_accumulated, 0)) / u_picture;
-    more = accumulated_texels(closed, place * texels_of(closed), edges).rg;
+    more = closed_texels(closed, box, edges, place).rg;
 }
 
 // What the restore brush has undone at a place in A's texels: a way (E), and the part of what follows (T). E is read as A is,
 // so that beneath the brush they add up to what A was also between texels.
-vec3 undone_at(sampler2D undone, vec4 edges, vec2 place) {
-    vec3 read = accumulated_texels(undone, place * texels_of(undone), edges).rgb;
+vec3 undone_at(sampler2D undone, vec4 box, vec4 edges, vec2 place) {
+    vec3 read = closed_texels(undone, box, edges, place).rgb;
     return vec3(read.rg, clamp(read.b, 0.0, 1.0));
 }
 
@@ -228,10 +241,12 @@ void undo(vec3 undone, vec2 moved, inout vec2 more, inout vec2 back, inout float
 vec2 displacement_from(vec2 x, vec2 moved, vec2 place) {
     vec2 more = accumulated_texels(u_accumulated, place, u_edges).rg, back = vec2(0.0);
     float part = 1.0;
-#define UNDO(undone, edges) undo(undone_at(undone, edges, place), moved, more, back, part)
-#define FOLLOW(closed, edges, n) if (IS_UNDONE(n)) UNDO(closed, edges); else follow(closed, edges, x, moved, more, place);
+#define UNDO(undone, box, edges) undo(undone_at(undone, box, edges, place), moved, more, back, part)
+#define GO_ON(closed, box, edges) follow(closed, box, edges, x, moved, more, place)
+#define FOLLOW(closed, box, edges, n) if (IS_UNDONE(n)) UNDO(closed, box, edges); else GO_ON(closed, box, edges);
     THROUGH_CLOSED(FOLLOW)
 #undef FOLLOW
+#undef GO_ON
 #undef UNDO
     moved += more;
 #if UNDONE > 0

@@ -57,7 +57,7 @@ void main() {
 #endif
     place += moved / texel;
 #ifdef CARRY
-    out_displacement = vec4(undone_at(u_undone, u_edges, place), 0.0);
+    out_displacement = vec4(undone_at(u_undone, vec4(0.0, 0.0, 1.0, 1.0), u_edges, place), 0.0);
 #else
     out_displacement = from + displacement_from(x, moved, place);
 #endif

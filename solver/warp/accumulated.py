@@ -19,6 +19,7 @@ from solver.gl.passes import Region
 from solver.gl.tiled import TILE, SavedTiles, TiledField
 from solver.grid import Grid
 from solver.steepness import Steepness
+from solver.warp.closed import ClosedMap
 from solver.warp.evenness import FLAT, Evenness
 from solver.warp.state import (
     ACCUMULATED,
@@ -36,12 +37,13 @@ LEAST_TEXELS = 4  # along a cell, with which the map's own interpolation costs n
 MOST_TEXELS = 2**25  # in all: 256 MiB each of two textures
 REACH = 3  # texels that the cubic reaches to one side, at most
 NOWHERE = 1e-4  # texels: a smaller displacement counts as none
-# Largest |grad A| of a map that is not closed, with `LEAST_TEXELS` along the finest cell that has moved it. With texels of h
-# it is in proportion to h^(-3/4): det J is wrong by |grad A|^4 h^3 between them.
+# Largest |grad A| of a map that is not closed, with `LEAST_TEXELS` along the finest cell that has moved it. With texels
+# of h it is in proportion to h^(-3/4): det J is wrong by |grad A|^4 h^3 between them.
 STEEPEST = 6.0
 # The least part that det J on one side of a texel may be of that on another: where they differ by more than the smaller
 # one, the interpolation may as well be folded.
 LEAST_EVEN = 0.5
+RIM = 6  # texels of nothing around a closed map of a part of the picture: as many as the quintic reads along a side
 CLOSED_TEXELS = 8  # along a cell, at least, of a closed map that has fewer texels than A: with so many none folds
 
 Limits = tuple[float, float, float, float]
@@ -78,9 +80,10 @@ class AccumulatedMap:
 
     Before it becomes too steep for its texels it is closed, and a new one of nothing begins; a place is looked up in
     the new one first, then in the closed ones, the last one closed first. These have fewer texels where as many would
-    leave no room for `MOST_CLOSED`, but no fewer than `CLOSED_TEXELS` for a cell that moved them. Once there are as
-    many as there may be, it goes on however steep it is. What the restore brush takes away of the closed ones is kept
-    beside it, is moved and closed with it, and comes before it in the list.
+    leave no room for `MOST_CLOSED`, but no fewer than `CLOSED_TEXELS` for a cell that moved them; where there is no
+    room for the whole picture then, they cover the tiles that have moved. Once there are as many as there may be, it
+    goes on however steep it is. What the restore brush takes away of the closed ones is kept beside it, is moved and
+    closed with it, and comes before it in the list.
 
     Args:
         device: the device.
@@ -95,15 +98,13 @@ class AccumulatedMap:
         finest: the smallest cell that has moved the map, longer sides; 0 if it may have any detail.
         is_walled: nothing has crossed the picture's edges.
         images: what lies beyond these then, as of what it has taken in there; 0 where it has taken in nothing.
-        closed_images: the same of the closed maps.
     """
 
     def __init__(self, device: Device, size: tuple[int, int], extent: tuple[float, float]) -> None:
         self.device = device
         self.size = size
         self.extent = extent
-        self.closed: list[TiledField] = []
-        self.closed_images: list[Images] = []
+        self.closed: list[ClosedMap] = []
         self._steepness = Steepness(device, size, "accumulated map", TILE=TILE)
         self._evenness = Evenness(device, size, self._steepness.blocks)
         self.now = TiledField(device, size, 2, "accumulated map")
@@ -156,18 +157,17 @@ class AccumulatedMap:
     @property
     def defines(self) -> dict[str, object]:
         """The defines of `lib/warp.glsl` for it and the closed maps."""
-        chain = self._chain
-        undone = sum(1 << number for number, field in enumerate(chain) if _is_undone(field))
+        chain = self.chain
+        undone = sum(1 << number for number, closed in enumerate(chain) if closed.is_undone)
         return {name: number for name, number in (("CLOSED", len(chain)), ("UNDONE", undone)) if number}
 
     def inputs(self) -> dict[str, Any]:
         """The inputs of `lib/warp.glsl` for it and the closed maps."""
-        return (
-            self.own()
-            | {f"closed_{number}": field for number, field in enumerate(self._chain)}
-            | {f"edges_{number}": self._edges_of(images) for number, images in enumerate(self.chain_images)}
-            | {"limits": self.limits}
-        )
+        inputs: dict[str, Any] = self.own() | {"limits": self.limits}
+        for number, closed in enumerate(self.chain):
+            edges = self._edges_of(closed.images)
+            inputs |= {f"closed_{number}": closed.field, f"box_{number}": closed.box, f"edges_{number}": edges}
+        return inputs
 
     def own(self) -> dict[str, Any]:
         """The same without the closed maps, as a remap needs it: while there are any, it must stay in the picture."""
@@ -199,9 +199,10 @@ class AccumulatedMap:
         self.images = left, right, top, bottom
 
     @property
-    def _chain(self) -> list[TiledField]:
-        """What a place is looked up in after the map, the last one first."""
-        return self.closed if self.undone is None else [*self.closed, self.undone]
+    def chain(self) -> list[ClosedMap]:
+        """The closed maps and what is undone: what a place is looked up in after the map, the last one first."""
+        undone = [] if self.undone is None else [ClosedMap(self.undone, (0, 0, *self.size), self.images)]
+        return self.closed + undone
 
     @property
     def _pairs(self) -> list[tuple[TiledField, TiledField, dict[str, Field]]]:
@@ -239,19 +240,34 @@ class AccumulatedMap:
         return True
 
     @property
-    def _closed_size(self) -> tuple[int, int]:
-        """(width, height) in texels that it has once it is closed."""
+    def _times(self) -> int:
+        """How many of its texels along a side become one if the whole of it is closed."""
         least = (self.finest * n / side / CLOSED_TEXELS for n, side in zip(self.size, self.extent, strict=True))
         fitting = math.sqrt(self.now.nbytes * MOST_CLOSED / MOST_CLOSED_BYTES)
-        times = max(min(math.ceil(fitting), *map(math.floor, least)), 1)
-        return -(-self.size[0] // times), -(-self.size[1] // times)
+        return max(min(math.ceil(fitting), *map(math.floor, least)), 1)
+
+    @property
+    def _kept(self) -> tuple[Region, int] | None:
+        """The texels of it that are kept once it is closed, and how many along a side become one; None: no room."""
+        taken = sum(closed.field.nbytes for closed in self.closed)
+        for (x, y, width, height), times in (((0, 0, *self.size), self._times), (self._box, 1)):
+            texels = -(-width // times) * -(-height // times)
+            if taken + 4 * texels * sum(field.components for field, _, _ in self._pairs) <= MOST_CLOSED_BYTES:
+                return (x, y, width, height), times
+        return None
+
+    @property
+    def _box(self) -> Region:
+        """The tiles of it that are not nothing, and `RIM` texels around them."""
+        tiles = np.array([tile for field, _, _ in self._pairs for tile in field.tiles] or [(0, 0, 1, 1)])
+        left, top = np.maximum(tiles[:, :2].min(axis=0) - RIM, 0).tolist()
+        right, bottom = np.minimum((tiles[:, :2] + tiles[:, 2:]).max(axis=0) + RIM, self.size).tolist()
+        return left, top, right - left, bottom - top
 
     @property
     def may_close(self) -> bool:
         """True if there is room for another closed map."""
-        width, height = self._closed_size
-        own = sum(field.components for field, _, _ in self._pairs) * 4 * width * height
-        return len(self._chain) < MOST_CLOSED and own + sum(field.nbytes for field in self.closed) <= MOST_CLOSED_BYTES
+        return len(self.chain) < MOST_CLOSED and self._kept is not None
 
     def _look(self, tiles: list[Region]) -> None:
         """Look at how steep tiles of `_next` are, if another map may be closed."""
@@ -269,8 +285,9 @@ class AccumulatedMap:
     @property
     def _steepest(self) -> float:
         """The largest |grad A| that it carries, with as many texels as it will have once it is closed."""
-        texels = (self.finest * n / side for n, side in zip(self._closed_size, self.extent, strict=True))
-        return STEEPEST * max(min(texels) / LEAST_TEXELS, 1.0) ** 0.75
+        times = self._times if self._kept is None else self._kept[1]
+        texels = self.finest / max(self._spacing) / times
+        return STEEPEST * max(texels / LEAST_TEXELS, 1.0) ** 0.75
 
     @property
     def _spacing(self) -> tuple[float, float]:
@@ -279,25 +296,32 @@ class AccumulatedMap:
     def close(self) -> None:
         """Keep it as it is, and go on with a map of nothing; what was planned is forgotten."""
         self.forget()
-        size, steep = self._closed_size, [self.now] if self.undone is None else [self.undone, self.now]
-        self.closed_images += [self.images] * len(steep)
-        if size == self.size:
-            self.closed += steep
+        region, times = self._kept or ((0, 0, *self.size), self._times)
+        steep = [self.now] if self.undone is None else [self.undone, self.now]
+        if region[2:] == self.size and times == 1:
+            self.closed += [ClosedMap(now, region, self.images) for now in steep]
             self.now, self.undone = self._blank(2, "accumulated map"), None
         else:
-            for now in steep:
-                self.closed.append(closed := self._blank(now.components, "closed map", size))
-                resample = self.device.pass_("warp/resample.frag", CUBIC=1)
-                regions = [_resampled(tile, self.size, size) for tile in now.tiles]
-                resample(
-                    closed, region=regions, displacement=now, images=self.edges, origin=(0.0, 0.0), step=closed.texel
-                )
+            self.closed += [ClosedMap(self._copy(now, region, times), region, self.images) for now in steep]
             # Clearing the map itself would copy at once what saves hold of it.
             self.now, self._next = self._next, self.now
             self.now.clear()
         self._drop_undone()
         self.finest, self.images = 1.0, OPEN
         self._stale = set(self._next.tiles)  # cleared with the next remap, a few in each step
+
+    def _copy(self, now: TiledField, region: Region, times: int) -> TiledField:
+        """Its texels in a region; or of all of it, one for so many along a side."""
+        x, y, *sides = region
+        width, height = (-(-side // times) for side in sides)
+        closed = self._blank(now.components, "closed map", (width, height))
+        if times == 1:
+            self.device.pass_("gl/copy.frag")(closed, field=now, offset=(x, y))
+        else:
+            resample = self.device.pass_("warp/resample.frag", CUBIC=1)
+            regions = [_resampled(tile, self.size, closed.size) for tile in now.tiles]
+            resample(closed, region=regions, displacement=now, images=self.edges, origin=(0.0, 0.0), step=closed.texel)
+        return closed
 
     def forget(self) -> None:
         """Drop what is planned."""
@@ -336,45 +360,41 @@ class AccumulatedMap:
 
     def saved(self) -> dict[str, TiledField]:
         """The fields by name, to be saved."""
-        names = [f"{UNDONE if _is_undone(field) else CLOSED}{number}" for number, field in enumerate(self._chain)]
-        return {ACCUMULATED: self.now} | dict(zip(names, self._chain, strict=True))
-
-    @property
-    def sizes(self) -> list[tuple[int, int]]:
-        """(width, height) in texels of the closed maps, and of what is undone, as `saved` names them."""
-        return [field.size for field in self._chain]
-
-    @property
-    def chain_images(self) -> list[Images]:
-        """The images of the same."""
-        return self.closed_images + ([] if self.undone is None else [self.images])
+        names = (f"{UNDONE if closed.is_undone else CLOSED}{number}" for number, closed in enumerate(self.chain))
+        return {ACCUMULATED: self.now} | dict(zip(names, (closed.field for closed in self.chain), strict=True))
 
     def restore(
-        self, saved: dict[str, SavedTiles], limits: Limits, is_walled: bool, images: list[Images], finest: float
+        self,
+        saved: dict[str, SavedTiles],
+        closed: list[tuple[Region, Images]],
+        limits: Limits,
+        is_walled: bool,
+        images: Images,
+        finest: float,
     ) -> None:
         """Go back to what `saved` gave, as it was then, with all else of then; what was planned is forgotten.
 
-        `images`: its own and `chain_images`.
+        `closed`: the regions and images of `chain`.
         """
         self.forget()
         self._stale.update(self.now.restore(saved[ACCUMULATED]))
         names = closed_in(saved)
         undone = saved[names.pop()] if names and names[-1].startswith(UNDONE) else None
-        kinds = [saved[name].kind for name in names]
-        same = sum(1 for _ in takewhile(lambda pair: pair[0].kind == pair[1], zip(self.closed, kinds, strict=False)))
+        kinds = [(saved[name].kind, *places) for name, places in zip(names, closed, strict=False)]
+        mine = ((field.kind, region, images) for field, region, images in self.closed)
+        same = sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(mine, kinds, strict=False)))
         self._open(same)
-        self.closed += [self._blank(kind.components, "closed map", kind.size) for kind in kinds[same:]]
-        for name, field in zip(names, self.closed, strict=True):
-            field.restore(saved[name])
+        for kind, region, beyond in kinds[same:]:
+            self.closed.append(ClosedMap(self._blank(kind.components, "closed map", kind.size), region, beyond))
+        for name, one in zip(names, self.closed, strict=True):
+            one.field.restore(saved[name])
         if undone is None:
             self._drop_undone()
         elif self.undone is None:
             self._begin_undoing()
         if undone is not None and self.undone is not None:
             self._stale.update(self.undone.restore(undone))
-        self.limits, self.is_walled, self.finest = limits, is_walled, finest
-        self.images, *closed = images
-        self.closed_images = closed[: len(self.closed)]
+        self.limits, self.is_walled, self.images, self.finest = limits, is_walled, images, finest
 
     def clear(self) -> None:
         """The identity; what was planned is forgotten."""
@@ -395,8 +415,7 @@ class AccumulatedMap:
     def _open(self, left: int = 0) -> None:
         """Drop the closed maps but the first so many, and what is undone of them."""
         while len(self.closed) > left:
-            self.closed.pop().release()
-        del self.closed_images[left:]
+            self.closed.pop().field.release()
         if not left:
             self._drop_undone()
 
@@ -405,10 +424,6 @@ class AccumulatedMap:
             if field is not None:
                 field.release()
         self.undone = self._next_undone = None
-
-
-def _is_undone(field: TiledField) -> bool:
-    return field.components == UNDONE_COMPONENTS
 
 
 def _resampled(tile: Region, size: tuple[int, int], fewer: tuple[int, int]) -> Region:

@@ -36,6 +36,7 @@ from solver.warp.state import (
     EDGES,
     FACTOR,
     OPEN,
+    REGIONS,
     SIZES,
     SUBMAPS,
     Images,
@@ -44,6 +45,7 @@ from solver.warp.state import (
     closed_in,
     grid_in,
     images_in,
+    regions_in,
     values_of,
 )
 from solver.warp.submap import STEEPEST, Level, Submap, away_from_held, defines_of, images_of, inputs_of, window_of
@@ -358,7 +360,10 @@ class WarpMap:
         values: dict[str, Any] = {"steps": self._steps, "limits": accumulated.limits, "walled": accumulated.is_walled}
         values[f"{ACCUMULATED} images"] = accumulated.images
         values["finest"] = accumulated.finest
-        values |= {SIZES: accumulated.sizes, EDGES: accumulated.chain_images} if accumulated.sizes else {}
+        if accumulated.chain:
+            values[SIZES] = [closed.field.size for closed in accumulated.chain]
+            values[REGIONS] = [closed.region for closed in accumulated.chain]
+            values[EDGES] = [closed.images for closed in accumulated.chain]
         values |= {"grid": values_of(self.grid), "settled": self._is_settled, "submap images": self._submap.images}
         fields |= self.factors.save()
         for name, level in self._remapping.saved():
@@ -385,9 +390,10 @@ class WarpMap:
         left, top, right, bottom = state.values["limits"].tolist()
         is_walled = bool(state.values.get("walled", True))
         finest = float(state.values.get("finest", 0.0))
-        chain = chain_images_in(state.values, len(closed_in(state.tiles)))
-        mine = [images[ACCUMULATED], *chain]
-        self._accumulated.restore(state.tiles, (left, top, right, bottom), is_walled, mine, finest)
+        count, size = len(closed_in(state.tiles)), self._accumulated.size
+        closed = list(zip(regions_in(state.values, count, size), chain_images_in(state.values, count), strict=True))
+        mine = images[ACCUMULATED]
+        self._accumulated.restore(state.tiles, closed, (left, top, right, bottom), is_walled, mine, finest)
         if grid != self.grid:
             self._submap.release()
             self._submap = Submap(self.device, grid)

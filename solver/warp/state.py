@@ -8,13 +8,15 @@ from itertools import pairwise
 import numpy as np
 
 from solver.gl.device import Device
+from solver.gl.passes import Region
 from solver.gl.tiled import TILE, Kind, SavedTiles
 from solver.grid import Grid
 from solver.state import State
 
 SUBMAPS = {"submap": "grid", "gathered": "gathered grid", "pending": "pending grid"}  # and where their grids are
 FACTOR, CLOSED, UNDONE = "factor ", "closed map ", "undone "  # and their numbers
-ACCUMULATED, SIZES, EDGES = "accumulated map", "closed sizes", "closed images"
+ACCUMULATED = "accumulated map"
+SIZES, REGIONS, EDGES = "closed sizes", "closed regions", "closed images"  # and of what is undone beside it
 # Closed maps, each with what is undone of those before it counted as one more. With what is undone beside the
 # accumulated map, `seek.frag` then reads 16 textures, as many as OpenGL 3.3 promises a stage.
 MOST_CLOSED = 8
@@ -60,6 +62,7 @@ class MapState(State):
             closed = closed_in(name.removesuffix("/places") for name in arrays if name.endswith("/places"))
             if len(closed) - (closed[-1:] != [] and closed[-1].startswith(UNDONE)) > MOST_CLOSED:
                 raise ValueError(f"its map has {len(closed)} closed ones, more than there may be")
+            regions_in(arrays, len(closed), accumulated.kind.size)
             for name, size in zip(closed, _sizes(arrays, len(closed), accumulated.kind.size), strict=True):
                 components = UNDONE_COMPONENTS if name.startswith(UNDONE) else 2
                 tiles[name] = SavedTiles.nothing(accumulated.kind._replace(size=size, components=components))
@@ -82,6 +85,19 @@ def _sizes(arrays: Mapping[str, np.ndarray], count: int, largest: tuple[int, int
     if sizes.shape != (count, 2) or ((sizes < 1) | (sizes > largest)).any():
         raise ValueError("the sizes of its closed maps are missing")
     return [(int(width), int(height)) for width, height in sizes]
+
+
+def regions_in(values: Mapping[str, np.ndarray], count: int, size: tuple[int, int]) -> list[Region]:
+    """The texels of a map of `size` that so many closed ones cover; all of them if they are not told.
+
+    Raises:
+        ValueError: if they are none.
+    """
+    regions = np.asarray(values.get(REGIONS, [(0, 0, *size)] * count)).reshape(-1, 4)
+    corners, sides = regions[:, :2], regions[:, 2:]
+    if len(regions) != count or (corners < 0).any() or (sides < 1).any() or (corners + sides > size).any():
+        raise ValueError("the regions of its closed maps are missing")
+    return [(int(x), int(y), int(width), int(height)) for x, y, width, height in regions]
 
 
 def closed_in(names: Iterable[str]) -> list[str]:

@@ -1017,6 +1017,53 @@ def test_closed_maps_of_a_large_map_have_as_many_texels_as_there_is_room_for(
         made.release()
 
 
+@pytest.mark.parametrize("undo", [False, True])
+def test_closed_maps_without_room_for_the_picture_are_boxes_of_it(
+    undo: bool, device: Device, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They lead as those all over the picture do, are saved and come back, and are undone by the restore brush."""
+    grid = Grid(192, 128, (1.0, 2 / 3))
+    # At the left and the upper edge of the picture, away from all, and at the right and the lower edge.
+    flows = [swirl(centre, 0.12) for centre in ((0.1, 0.11), (0.5, 0.3), (0.5, 0.32) if undo else (0.92, 0.6))]
+    found = []
+    for room in (2**27, 2**27, 1536 * 1024 * 8 - 1):
+        monkeypatch.setattr("solver.warp.accumulated.MOST_CLOSED_BYTES", room)
+        warp = WarpMap(device, grid, (1536, 1024))
+        for number, flow in enumerate(flows):
+            for _ in range(12):
+                warp.advance_prescribed(flow, 0.04)
+            warp.remap()
+            warp.close()
+            if undo and number == 1:
+                warp.restore_under((0.5, 0.33), 0.07, 0.5, 0.6)
+        found.append(warp)
+    whole, again, boxed = found
+    state = boxed.save()
+    regions = state.values["closed regions"]
+    assert len(regions) == (4 if undo else 3)
+    assert (regions[:, 2:] < (1536, 1024)).any(axis=1).all()
+    points = np.random.default_rng(2).uniform((0, 0), (1.0, 2 / 3), (8000, 2))
+    np.testing.assert_array_equal(whole.at(points), again.at(points))
+    assert difference(whole.read((300, 200)), boxed.read((300, 200))) < 2e-6
+    assert difference(whole.at(points), boxed.at(points)) < 2e-6
+    np.testing.assert_allclose(boxed.determinants(points), whole.determinants(points), atol=2e-3)
+    seen = [one.seek(points, points, np.full(len(points), 0.05)) for one in (whole, boxed)]
+    np.testing.assert_allclose(seen[1][0], seen[0][0], atol=1e-5)
+    template, then = again.save(), WarpMap(device, grid, (1536, 1024))
+    resumed = template.with_arrays(device, state.arrays())
+    later = []
+    for one, moment in ((boxed, state), (then, resumed)):
+        one.restore(moment)
+        one.advance_prescribed(flows[1], 0.02)
+        later.append(one.read((300, 200)))
+    np.testing.assert_array_equal(later[0], later[1])
+    for wrong in (np.full_like(regions, 700), regions[:1], regions * 0, -regions):
+        with pytest.raises(ValueError, match="regions of its closed maps"):
+            template.with_arrays(device, state.arrays() | {"closed regions": wrong})
+    for made in (state, template, resumed, then, *found):
+        made.release()
+
+
 def test_closed_maps_are_held_and_restored_as_one(device: Device) -> None:
     """What is frozen keeps every bit while more are closed; the restore brush gets through them to the identity."""
     warp, flow = wound_up(device, 5.0), swirl((0.5, 0.5), 0.45)
