@@ -16,7 +16,7 @@ import numpy as np
 
 from app.errors import Cancelled, UserError
 from app.media.clip import DEEP, SHALLOW, WHOLE, FileClip, FrameRange, has_changed
-from app.media.codecs import apng, gif, pillow, tiff
+from app.media.codecs import apng, gif, pillow, tiff, webp
 from app.media.codecs.decoding import decoding, head_of
 from app.media.codecs.layered import Animation
 from app.media.formats import kind_of
@@ -158,22 +158,35 @@ def _animation(name: str, path: Path, max_pixels: int) -> tuple[list[int], list[
         if found is None:
             return [], [], False, 0
         durations = [_shown_for(one.seconds * 1000) for one in found.frames]
-        return list(range(len(durations))), durations, found.has_alpha(), found.plays
+        return list(range(len(durations))), durations, found.has_alpha(max_pixels), found.plays
     with pillow.opened(name, path, max_pixels) as image:
         if not getattr(image, "is_animated", False):
             return [], [], False, 0
-        places = list(range(image.n_frames))
-        durations, alpha = [], False
-        for place in places:
-            image.seek(place)
-            image.load()
-            durations.append(_shown_for(Fraction(image.info.get("duration") or 0)))
-            alpha = alpha or (image.has_transparency_data and _pixels(image, True)[..., 3].min() < 255)
-        alpha = alpha or _layered(name, path) is not None
+        with open_input(path, "clip") as stream:
+            data = stream.read()
+        # Of a GIF that begins opaque Pillow's frames are too.
+        frames = gif.controls(data) if name == "GIF" else [(one, True) for one in webp.durations(data)]
+        if len(frames) != image.n_frames:
+            raise ValueError(f"it has {len(frames)} of its {image.n_frames} frames")
+        durations = [_shown_for(Fraction(milliseconds)) for milliseconds, _ in frames]
+        alpha = _layered(name, path) is not None or (frames[0][1] and _is_seen_through(image, max_pixels))
         loops = image.info.get("loop")
         # a GIF tells how often it begins again, or nothing if it does not
         plays = loops or 0 if name != "GIF" else 1 if loops is None else loops + 1 if loops else 0
-        return places, durations, bool(alpha), plays
+        return list(range(len(frames))), durations, alpha, plays
+
+
+def _is_seen_through(image: Any, most: int) -> bool:
+    """Whether a frame of Pillow's image has alpha; believed if looking would take more than `most` pixels."""
+    for place in range(image.n_frames):
+        image.seek(place)
+        image.load()
+        if not image.has_transparency_data and image.format == "WEBP":
+            return False  # what says so is the head of the file
+        most -= image.width * image.height
+        if most < 0 or (image.has_transparency_data and _pixels(image, True)[..., 3].min() < 255):
+            return True
+    return False
 
 
 def _layered(name: str, path: Path) -> Animation | None:

@@ -129,11 +129,21 @@ def test_an_animation_has_alpha_only_where_something_is_seen_through(tmp_path: P
         "nothing before": ([(0, 0, whole, 2, 0), (3, 2, part, 0, 0)], True),
         "see-through": ([(0, 0, whole, 0, 0), (2, 2, clear, 0, 0)], True),
         "laid over": ([(0, 0, whole, 0, 0), (2, 2, clear, 0, 1)], False),
+        "laid over what is cleared": ([(0, 0, whole, 0, 0), (2, 2, part, 1, 0), (2, 2, clear, 0, 1)], True),
+        "cleared again": ([(0, 0, whole, 0, 0), (2, 2, part, 1, 0), (2, 2, part, 2, 0), (9, 2, part, 0, 0)], True),
     }.values():
         found = apng.read(encoded(parts))
         assert found is not None
-        assert found.has_alpha() == seen
+        assert found.has_alpha(400_000_000) == seen
         assert any(canvas[..., 3].min() < 255 for canvas in found.shown()) == seen
+
+
+def test_opening_decodes_no_frame_that_lies_over_what_is_opaque_and_no_more_than_a_picture(tmp_path: Path):
+    whole = np.full((HEIGHT, WIDTH, 4), 255)
+    for blend, most, seen in ((1, HEIGHT * WIDTH, False), (0, HEIGHT * WIDTH, True), (0, 3 * HEIGHT * WIDTH, False)):
+        found = apng.read(encoded([(0, 0, whole, 0, 0), (0, 0, whole, 0, blend), (0, 0, whole, 0, blend)]))
+        assert found is not None
+        assert found.has_alpha(most) == seen
 
 
 @pytest.mark.parametrize("colour", [0, 2, 4, 6])

@@ -15,6 +15,7 @@ from app.media.losses import few
 
 SIGNATURE = 8
 KEPT = (b"PLTE", b"tRNS")
+ALPHA = 4  # in the kind of samples that the header tells
 HUNDREDTHS = 100  # of a second are the steps of a frame that names none
 
 
@@ -74,4 +75,5 @@ def _frame(control: bytes, head: bytes, kept: Sequence[tuple[bytes, bytes]], pie
         for kind, body in chunks
     )
     seconds = Fraction(above, below or HUNDREDTHS)
-    return Frame(x, y, width, height, seconds, disposal, blend == 1, b"\x89PNG\r\n\x1a\n" + file)
+    is_opaque = not head[9] & ALPHA and all(kind != b"tRNS" for kind, _ in kept)
+    return Frame(x, y, width, height, seconds, disposal, blend == 1, b"\x89PNG\r\n\x1a\n" + file, is_opaque)

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator
+from contextlib import suppress
 from fractions import Fraction
 
 from app.media.codecs.layered import BACKGROUND, NONE, PREVIOUS, Animation, Frame
 
-CONTROL, IMAGE, EXTENSION = 0xF9, 0x2C, 0x21
+CONTROL, IMAGE, EXTENSION, END = 0xF9, 0x2C, 0x21, 0x3B
 HEAD = 13  # bytes of the header and the screen
 
 
@@ -30,6 +31,16 @@ def read(data: bytes) -> Animation | None:
     return None if frames[0].is_over or is_beyond or not any(clears) else Animation(size, frames, 0)
 
 
+def controls(data: bytes) -> list[tuple[int, bool]]:
+    """The milliseconds of each frame, and whether a colour of it is seen through; as far as the file is whole."""
+    found = list[tuple[int, bool]]()
+    with suppress(IndexError, struct.error):
+        head = data[: HEAD + len(_table(data, HEAD, data[10]))]
+        for frame in _frames(data, len(head), head):
+            found.append((int(1000 * frame.seconds), frame.is_over))
+    return found
+
+
 def _table(data: bytes, at: int, flags: int) -> bytes:
     """The table of colours that stands there, if the flags say so."""
     return data[at : at + 3 * 2 ** ((flags & 7) + 1)] if flags & 0x80 else b""
@@ -37,7 +48,10 @@ def _table(data: bytes, at: int, flags: int) -> bytes:
 
 def _frames(data: bytes, at: int, head: bytes) -> Iterator[Frame]:
     control = bytes(4)
-    while at < len(data) and data[at] in (IMAGE, EXTENSION):
+    while at < len(data) and data[at] != END:
+        if data[at] not in (IMAGE, EXTENSION):  # between blocks Pillow passes over what is none
+            at += 1
+            continue
         if data[at] == EXTENSION:
             if data[at + 1] == CONTROL:
                 control = data[at + 3 : at + 7]

@@ -13,6 +13,7 @@ from app.media.codecs.png import spread_key
 
 NONE, BACKGROUND, PREVIOUS = range(3)  # what becomes of a frame when the next one comes
 PNG_BITS = 24  # the place of the bits a channel in a PNG
+AT_ONCE = 2**20  # pixels that are mixed: in floats they take many times the memory
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,7 @@ class Frame:
         disposal: one of the three above.
         is_over: it is laid over what is there, and does not replace it.
         file: a PNG or GIF of it alone.
+        is_opaque: nothing of it can be seen through, by the kind of its samples.
     """
 
     x: int
@@ -35,6 +37,7 @@ class Frame:
     disposal: int
     is_over: bool
     file: bytes
+    is_opaque: bool = False
 
     def covers(self, other: Frame) -> bool:
         """Whether nothing of the other's place is beyond its own."""
@@ -46,6 +49,11 @@ class Frame:
     def place(self) -> tuple[slice, slice]:
         return slice(self.y, self.y + self.height), slice(self.x, self.x + self.width)
 
+    def place_in(self, other: Frame) -> tuple[slice, slice]:
+        """Its place among the pixels of another that covers it."""
+        x, y = self.x - other.x, self.y - other.y
+        return slice(y, y + self.height), slice(x, x + self.width)
+
 
 @dataclass(frozen=True)
 class Animation:
@@ -55,29 +63,48 @@ class Animation:
     frames: Sequence[Frame]
     plays: int
 
-    def has_alpha(self) -> bool:
-        """Whether anything of any frame is seen through; only what a frame changes is looked at."""
-        cleared = Frame(0, 0, *self.size, Fraction(0), BACKGROUND, False, b"")  # as all is at first
-        found = False
-        for number, (frame, canvas) in enumerate(zip(self.frames, self.shown(), strict=True)):
-            is_bare = cleared is not None and not frame.covers(cleared)
-            found = found or is_bare or bool(canvas[frame.place][..., 3].min() < 255)
-            is_gone = frame.disposal == BACKGROUND or (frame.disposal == PREVIOUS and not number)
-            cleared = frame if is_gone else None
-        return found
+    def has_alpha(self, most: int) -> bool:
+        """Whether anything of any frame is seen through.
+
+        Only frames that may show it are decoded: not those that lie over what is opaque. Of an animation of which that
+        would be more than `most` pixels, it is believed that what can have alpha has it.
+        """
+        asked = list[tuple[Frame, tuple[slice, slice]]]()
+        cleared: Frame | None = Frame(0, 0, *self.size, Fraction(0), BACKGROUND, False, b"")  # as all is at first
+        for number, frame in enumerate(self.frames):
+            if cleared is not None and not frame.covers(cleared):
+                return True
+            if not frame.is_opaque and not frame.is_over:
+                asked.append((frame, (slice(None), slice(None))))
+            elif not frame.is_opaque and cleared is not None:
+                asked.append((frame, cleared.place_in(frame)))
+            if frame.disposal == BACKGROUND or (frame.disposal == PREVIOUS and not number):
+                cleared = frame
+            elif frame.disposal == NONE:
+                cleared = None
+        for frame, part in asked:
+            most -= frame.width * frame.height
+            if most < 0 or _decoded(frame)[part][..., 3].min() < 255:
+                return True
+        return False
 
     def shown(self) -> Iterator[np.ndarray]:
         """What is seen of each frame in turn, (h, w, 4) uint8; the array is drawn on for the next."""
         canvas = np.zeros((self.size[1], self.size[0], 4), np.uint8)
         for number, frame in enumerate(self.frames):
-            before = canvas[frame.place].copy()
+            place = canvas[frame.place]
+            is_restored = frame.disposal == PREVIOUS and number > 0
+            before = place.copy() if is_restored else None
             drawn = _decoded(frame)
-            canvas[frame.place] = _over(drawn, before) if frame.is_over else drawn
+            band = max(1, AT_ONCE // frame.width)
+            for rows in (slice(row, row + band) for row in range(0, frame.height, band)):
+                place[rows] = _over(drawn[rows], place[rows]) if frame.is_over else drawn[rows]
+            del drawn
             yield canvas
-            if frame.disposal == PREVIOUS and number:
-                canvas[frame.place] = before
+            if before is not None:
+                place[:] = before
             elif frame.disposal != NONE:
-                canvas[frame.place] = 0
+                place[:] = 0
 
 
 def _decoded(frame: Frame) -> np.ndarray:
