@@ -164,16 +164,24 @@ def _animation(name: str, path: Path, max_pixels: int) -> tuple[list[int], list[
             return [], [], False, 0
         with open_input(path, "clip") as stream:
             data = stream.read()
-        # Of a GIF that begins opaque Pillow's frames are too.
-        frames = gif.controls(data) if name == "GIF" else [(one, True) for one in webp.durations(data)]
-        if len(frames) != image.n_frames:
-            raise ValueError(f"it has {len(frames)} of its {image.n_frames} frames")
-        durations = [_shown_for(Fraction(milliseconds)) for milliseconds, _ in frames]
-        alpha = _layered(name, path) is not None or (frames[0][1] and _is_seen_through(image, max_pixels))
+        if name == "GIF":
+            frames = gif.frames_of(data)
+            if frames:  # a frame that reaches beyond the screen widens it
+                reach = max(one.x + one.width for one in frames), max(one.y + one.height for one in frames)
+                if max(reach[0], image.width) * max(reach[1], image.height) > max_pixels:
+                    raise pillow.too_large(path, max_pixels)
+            told = [1000 * frame.seconds for frame in frames]
+        else:
+            frames, told = [], [Fraction(one) for one in webp.durations(data)]
+        if len(told) != image.n_frames:
+            raise ValueError(f"it has {len(told)} of its {image.n_frames} frames")
+        durations = [_shown_for(one) for one in told]
+        may_have = not frames or frames[0].is_over  # of a GIF that begins opaque Pillow's frames are too
+        alpha = _layered(name, path) is not None or (may_have and _is_seen_through(image, max_pixels))
         loops = image.info.get("loop")
         # a GIF tells how often it begins again, or nothing if it does not
         plays = loops or 0 if name != "GIF" else 1 if loops is None else loops + 1 if loops else 0
-        return list(range(len(frames))), durations, alpha, plays
+        return list(range(len(durations))), durations, alpha, plays
 
 
 def _is_seen_through(image: Any, most: int) -> bool:

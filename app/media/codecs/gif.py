@@ -8,6 +8,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator
 from contextlib import suppress
+from dataclasses import replace
 from fractions import Fraction
 
 from app.media.codecs.layered import BACKGROUND, NONE, PREVIOUS, Animation, Frame
@@ -31,13 +32,13 @@ def read(data: bytes) -> Animation | None:
     return None if frames[0].is_over or is_beyond or not any(clears) else Animation(size, frames, 0)
 
 
-def controls(data: bytes) -> list[tuple[int, bool]]:
-    """The milliseconds of each frame, and whether a colour of it is seen through; as far as the file is whole."""
-    found = list[tuple[int, bool]]()
+def frames_of(data: bytes) -> list[Frame]:
+    """The frames as far as the file is whole; a colour of those that are `is_over` is seen through."""
+    found = list[Frame]()
     with suppress(IndexError, struct.error):
         head = data[: HEAD + len(_table(data, HEAD, data[10]))]
         for frame in _frames(data, len(head), head):
-            found.append((int(1000 * frame.seconds), frame.is_over))
+            found.append(replace(frame, file=b""))
     return found
 
 
