@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +18,7 @@ PNG_BITS = 24  # the place of the bits a channel in a PNG
 AT_ONCE = 2**20  # pixels that are mixed: in floats they take many times the memory
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Frame:
     """A frame as the file has it.
 
@@ -25,8 +27,9 @@ class Frame:
         seconds: that it is shown.
         disposal: one of the three above.
         is_over: it is laid over what is there, and does not replace it.
-        file: a PNG or GIF of it alone.
+        pieces: of a file, PNG or GIF, of it alone.
         is_opaque: nothing of it can be seen through, by the kind of its samples.
+        pixels: of that file, which may reach beyond its place.
     """
 
     x: int
@@ -36,8 +39,13 @@ class Frame:
     seconds: Fraction
     disposal: int
     is_over: bool
-    file: bytes
-    is_opaque: bool = False
+    pieces: tuple[bytes, ...]
+    is_opaque: bool
+    pixels: int
+
+    @property
+    def is_empty(self) -> bool:
+        return not (self.width and self.height)
 
     def covers(self, other: Frame) -> bool:
         """Whether nothing of the other's place is beyond its own."""
@@ -70,7 +78,9 @@ class Animation:
         would be more than `most` pixels, it is believed that what can have alpha has it.
         """
         asked = list[tuple[Frame, tuple[slice, slice]]]()
-        cleared: Frame | None = Frame(0, 0, *self.size, Fraction(0), BACKGROUND, False, b"")  # as all is at first
+        cleared: Frame | None = Frame(
+            0, 0, *self.size, Fraction(0), BACKGROUND, False, (), False, 0
+        )  # as all is at first
         for number, frame in enumerate(self.frames):
             if cleared is not None and not frame.covers(cleared):
                 return True
@@ -79,12 +89,12 @@ class Animation:
             elif not frame.is_opaque and cleared is not None:
                 asked.append((frame, cleared.place_in(frame)))
             if frame.disposal == BACKGROUND or (frame.disposal == PREVIOUS and not number):
-                cleared = frame
+                cleared = None if frame.is_empty else frame
             elif frame.disposal == NONE:
                 cleared = None
         for frame, part in asked:
-            most -= frame.width * frame.height
-            if most < 0 or _decoded(frame)[part][..., 3].min() < 255:
+            most -= frame.pixels
+            if not frame.is_empty and (most < 0 or _is_seen_through(frame, part)):
                 return True
         return False
 
@@ -96,7 +106,7 @@ class Animation:
             is_restored = frame.disposal == PREVIOUS and number > 0
             before = place.copy() if is_restored else None
             drawn = _decoded(frame)
-            band = max(1, AT_ONCE // frame.width)
+            band = AT_ONCE // max(frame.width, 1) + 1
             for rows in (slice(row, row + band) for row in range(0, frame.height, band)):
                 place[rows] = _over(drawn[rows], place[rows]) if frame.is_over else drawn[rows]
             del drawn
@@ -109,20 +119,53 @@ class Animation:
 
 def _decoded(frame: Frame) -> np.ndarray:
     """The pixels (h, w, 4) of a frame, in 8 bits."""
-    from PIL import Image
-
-    bits = frame.file[PNG_BITS] if frame.file.startswith(b"\x89PNG") else 8
-    if bits == 16:
-        import imagecodecs
-
-        deep = (imagecodecs.png_decode(frame.file) >> 8).astype(np.uint8)
-        deep = deep.reshape(frame.height, frame.width, -1)
+    if frame.is_empty:
+        return np.zeros((frame.height, frame.width, 4), np.uint8)
+    file = b"".join(frame.pieces)
+    if _bits(file) == 16:
+        deep = _deep(file)
         grey, alpha = deep.shape[2] < 3, deep.shape[2] in (2, 4)
         opaque = deep[..., -1:] if alpha else np.full_like(deep[..., :1], 255)
         return np.concatenate([deep[..., [0, 0, 0] if grey else [0, 1, 2]], opaque], axis=2)
-    with Image.open(io.BytesIO(frame.file), formats=["PNG", "GIF"]) as image:
-        spread_key(image, bits)
-        return np.asarray(image.convert("RGBA"))
+    with _opened(file) as image:
+        return np.asarray(image.convert("RGBA"))[: frame.height, : frame.width]
+
+
+def _is_seen_through(frame: Frame, part: tuple[slice, slice]) -> bool:
+    """Whether anything of a part of a frame's pixels is; nothing is made of them but this."""
+    file = b"".join(frame.pieces)
+    rows, columns = (range(length)[one] for length, one in zip((frame.height, frame.width), part, strict=True))
+    if _bits(file) == 16:
+        deep = _deep(file)
+        return deep.shape[2] in (2, 4) and bool(deep[part][..., -1].min() < 255)
+    with _opened(file) as image:
+        image = image.crop((columns.start, rows.start, columns.stop, rows.stop))
+        if image.mode == "P" and isinstance(key := image.info.get("transparency"), int):
+            return image.histogram()[key] > 0
+        if image.mode not in ("LA", "RGBA"):
+            image = image.convert("RGBA")
+        return image.getchannel("A").getextrema()[0] < 255
+
+
+def _bits(file: bytes) -> int:
+    return file[PNG_BITS] if file.startswith(b"\x89PNG") else 8
+
+
+def _deep(file: bytes) -> np.ndarray:
+    """The upper 8 of the 16 bits of a PNG, (h, w, channels)."""
+    import imagecodecs
+
+    deep: np.ndarray = imagecodecs.png_decode(file)
+    return (deep[..., None] if deep.ndim == 2 else deep).astype("<u2", copy=False).view(np.uint8)[..., 1::2]
+
+
+@contextmanager
+def _opened(file: bytes) -> Iterator[Any]:
+    from PIL import Image
+
+    with Image.open(io.BytesIO(file), formats=["PNG", "GIF"]) as image:
+        spread_key(image, _bits(file))
+        yield image
 
 
 def _over(drawn: np.ndarray, below: np.ndarray) -> np.ndarray:
