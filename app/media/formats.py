@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from app.errors import UserError
-from app.media.codecs import avif, exr, jpeg, other, pillow, png, tiff, webp
+from app.media.codecs import avif, exr, gif, jpeg, other, pillow, png, tiff, webp
 from app.media.codecs.metadata import profile_name
 from app.model.picture import Picture
 
@@ -89,7 +89,7 @@ TABLE = (
         bits=(16, 32), codecs=exr.COMPRESSIONS, but={"texts": exr.unheld_texts}, multiplied=True,
         keeps=HEADER | {"dpi", "layers", "parts", "group", "half", "wide", "margins", "origin", "premultiplied"},
     ),
-    Format("GIF", (".gif",), partial(pillow.read, "GIF"), signature=rb"GIF8[79]a"),
+    Format("GIF", (".gif",), gif.read, signature=rb"GIF8[79]a"),
     Format("BMP", (".bmp",), partial(pillow.read, "BMP"), signature=rb"BM"),
     *(Format(name, endings, partial(other.read, name)) for name, endings in ONLY_READ.items()),
 )  # fmt: skip

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
-from itertools import accumulate, islice
+from itertools import accumulate
 from math import gcd, lcm
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ import numpy as np
 
 from app.errors import Cancelled, UserError
 from app.media.clip import DEEP, SHALLOW, WHOLE, FileClip, FrameRange, has_changed
-from app.media.codecs import apng, gif, pillow, tiff
+from app.media.codecs import apng, gif, pillow, tiff, webp
 from app.media.codecs.decoding import decoding, head_of
 from app.media.codecs.layered import Animation
 from app.media.formats import kind_of
@@ -73,27 +74,25 @@ class Pages(FileClip):
         first, last = part
         with decoding(self.path, self.kind):
             self._check_unchanged()
-            layered = _layered(self.kind, self.path)
-            shown = islice(layered.shown(), first, None) if layered else None
-            for number in range(first, min(len(self.places) if last is None else last + 1, len(self.places))):
-                if cancel():
-                    raise Cancelled
-                canvas = next(shown) if shown else None  # also of one that is kept: the next lies on it
-                if is_kept(number):
-                    continue
-                self._check_unchanged()
-                try:
-                    picture = self._page(self.places[number]) if canvas is None else self._of(canvas)
-                except Exception:
-                    self._check_unchanged()  # in the meantime
-                    raise
-                mine = picture.width, picture.height, picture.bits, picture.has_alpha
-                if mine != (self.width, self.height, self.bits, self.alpha):
-                    raise UserError(
-                        f"Cannot read {self.path}: frame {number} has {picture.width} x {picture.height} pixels of "
-                        f"{picture.pixels.shape[2]} x {picture.bits} bits, unlike the first; make them alike."
-                    )
-                yield number, picture
+            with self._reader() as read:
+                for number in range(first, min(len(self.places) if last is None else last + 1, len(self.places))):
+                    if cancel():
+                        raise Cancelled
+                    if is_kept(number):
+                        continue
+                    self._check_unchanged()
+                    try:
+                        picture = read(number)
+                    except Exception:
+                        self._check_unchanged()  # in the meantime
+                        raise
+                    mine = picture.width, picture.height, picture.bits, picture.has_alpha
+                    if mine != (self.width, self.height, self.bits, self.alpha):
+                        raise UserError(
+                            f"Cannot read {self.path}: frame {number} has {picture.width} x {picture.height} pixels of "
+                            f"{picture.pixels.shape[2]} x {picture.bits} bits, unlike the first; make them alike."
+                        )
+                    yield number, picture
 
     def _check_unchanged(self) -> None:
         """Raise `UserError` if the file is not as it was: a frame would be of another, or none."""
@@ -102,15 +101,29 @@ class Pages(FileClip):
         if self.state and state and state != self.state:
             raise has_changed(self.path, self.state[SIZE], state[SIZE])
 
-    def _of(self, canvas: np.ndarray) -> Picture:
-        return Picture((canvas if self.alpha else canvas[..., :3]).copy())
+    @contextmanager
+    def _reader(self) -> Iterator[Callable[[int], Picture]]:
+        """What gives one frame after another, by rising numbers; those between are decoded only if they must."""
+        layered = _layered(self.kind, self.path, self.max_pixels)
+        if layered is not None:
+            shown = enumerate(layered.shown())
 
-    def _page(self, place: int) -> Picture:
-        if self.kind == "TIFF":
-            return tiff.read(self.path, self.max_pixels, place)
-        with pillow.opened(ANIMATED[self.kind], self.path, self.max_pixels) as image:
-            image.seek(place)
-            return Picture(_pixels(image, self.alpha))
+            def of_layers(number: int) -> Picture:
+                canvas = next(canvas for at, canvas in shown if at == number)
+                return Picture((canvas if self.alpha else canvas[..., :3]).copy())
+
+            yield of_layers
+        elif self.kind == "TIFF":
+            with tiff.opened(self.path) as file:
+                yield lambda number: tiff.page_of(file, self.path, self.max_pixels, self.places[number])
+        else:
+            with pillow.opened(ANIMATED[self.kind], self.path, self.max_pixels) as image:
+
+                def of_image(number: int) -> Picture:
+                    image.seek(number)
+                    return Picture(np.asarray(image.convert("RGBA" if self.alpha else "RGB")))
+
+                yield of_image
 
 
 def read_pages(path: Path, first: Picture, max_pixels: int = MAX_PIXELS) -> Pages | None:
@@ -123,7 +136,8 @@ def read_pages(path: Path, first: Picture, max_pixels: int = MAX_PIXELS) -> Page
         if kind.name == "TIFF":
             places, durations, alpha, loops = tiff.pages_of(path), None, first.has_alpha, 0
         else:
-            places, durations, alpha, loops = _animation(ANIMATED[kind.name], path, max_pixels)
+            durations, alpha, loops = _animation(kind.name, path, max_pixels)
+            places = range(len(durations))
     if len(places) < 2:
         return None
     channels = first.pixels.shape[2] if kind.name == "TIFF" else 3 + alpha
@@ -150,48 +164,56 @@ def read_pages(path: Path, first: Picture, max_pixels: int = MAX_PIXELS) -> Page
     )
 
 
-def _animation(name: str, path: Path, max_pixels: int) -> tuple[list[int], list[Fraction], bool, int]:
-    """The places and durations, in seconds, of an animation's frames, whether any has alpha, and how often it plays."""
-    if name == "PNG":
-        with pillow.opened(name, path, max_pixels):  # which is not too large
-            found = _layered(name, path)
-        if found is None:
-            return [], [], False, 0
-        durations = [_shown_for(one.seconds * 1000) for one in found.frames]
-        return list(range(len(durations))), durations, found.has_alpha(), found.plays
-    with pillow.opened(name, path, max_pixels) as image:
+def _animation(kind: str, path: Path, max_pixels: int) -> tuple[list[Fraction], bool, int]:
+    """The durations of an animation's frames, in seconds, whether any has alpha, and how often it plays."""
+    layered = _layered(kind, path, max_pixels)
+    if layered is not None:
+        durations = [_shown_for(1000 * one.seconds) for one in layered.frames]
+        return durations, layered.has_alpha(max_pixels), layered.plays
+    if kind != "WebP":
+        return [], False, 0
+    with pillow.opened("WEBP", path, max_pixels) as image:
         if not getattr(image, "is_animated", False):
-            return [], [], False, 0
-        places = list(range(image.n_frames))
-        durations, alpha = [], False
-        for place in places:
-            image.seek(place)
-            image.load()
-            durations.append(_shown_for(Fraction(image.info.get("duration") or 0)))
-            alpha = alpha or (image.has_transparency_data and _pixels(image, True)[..., 3].min() < 255)
-        alpha = alpha or _layered(name, path) is not None
-        loops = image.info.get("loop")
-        # a GIF tells how often it begins again, or nothing if it does not
-        plays = loops or 0 if name != "GIF" else 1 if loops is None else loops + 1 if loops else 0
-        return places, durations, bool(alpha), plays
+            return [], False, 0
+        with open_input(path, "clip") as stream:
+            told = webp.durations(stream.read())
+        if len(told) != image.n_frames:
+            raise ValueError(f"it has {len(told)} of its {image.n_frames} frames")
+        durations = [_shown_for(Fraction(one)) for one in told]
+        return durations, _is_seen_through(image, max_pixels), image.info.get("loop") or 0
 
 
-def _layered(name: str, path: Path) -> Animation | None:
-    """The frames that Pillow does not lay over one another as they should be."""
-    read = {"PNG": apng.read, "GIF": gif.read}.get(name)
-    if read is None:
+def _is_seen_through(image: Any, most: int) -> bool:
+    """Whether a frame of a WebP has alpha; believed if looking would take more than `most` pixels."""
+    if not image.has_transparency_data:  # what says so is the head of the file
+        return False
+    for place in range(image.n_frames):
+        most -= image.width * image.height
+        if most < 0:
+            return True
+        image.seek(place)
+        if image.getchannel("A").getextrema()[0] < 255:
+            return True
+    return False
+
+
+def _layered(kind: str, path: Path, max_pixels: int) -> Animation | None:
+    """The frames of an animation that are to be laid over one another here. Raises `UserError` if one is too large."""
+    if kind not in ("GIF", "PNG"):
         return None
+    with pillow.opened(kind, path, max_pixels) as image:  # which is not too large
+        loop = image.info.get("loop")
     with open_input(path, "clip") as stream:
-        return read(stream.read())
+        data = stream.read()
+    found = apng.read(data) if kind == "PNG" else gif.frames(data, loop)
+    if found is not None and max(frame.pixels for frame in found.frames) > max_pixels:
+        raise pillow.too_large(path, max_pixels)
+    return found
 
 
 def _shown_for(milliseconds: Fraction) -> Fraction:
     """The seconds that a frame is shown."""
     return (milliseconds or Fraction(UNTOLD)).limit_denominator(1000) / 1000
-
-
-def _pixels(image: Any, alpha: bool) -> np.ndarray:
-    return np.asarray(image.convert("RGBA" if alpha else "RGB"))
 
 
 def _steps(durations: Sequence[Fraction]) -> tuple[Fraction, tuple[int, ...]]:

@@ -129,11 +129,21 @@ def test_an_animation_has_alpha_only_where_something_is_seen_through(tmp_path: P
         "nothing before": ([(0, 0, whole, 2, 0), (3, 2, part, 0, 0)], True),
         "see-through": ([(0, 0, whole, 0, 0), (2, 2, clear, 0, 0)], True),
         "laid over": ([(0, 0, whole, 0, 0), (2, 2, clear, 0, 1)], False),
+        "laid over what is cleared": ([(0, 0, whole, 0, 0), (2, 2, part, 1, 0), (2, 2, clear, 0, 1)], True),
+        "cleared again": ([(0, 0, whole, 0, 0), (2, 2, part, 1, 0), (2, 2, part, 2, 0), (9, 2, part, 0, 0)], True),
     }.values():
         found = apng.read(encoded(parts))
         assert found is not None
-        assert found.has_alpha() == seen
+        assert found.has_alpha(400_000_000) == seen
         assert any(canvas[..., 3].min() < 255 for canvas in found.shown()) == seen
+
+
+def test_opening_decodes_no_frame_that_lies_over_what_is_opaque_and_no_more_than_a_picture(tmp_path: Path):
+    whole = np.full((HEIGHT, WIDTH, 4), 255)
+    for blend, most, seen in ((1, HEIGHT * WIDTH, False), (0, HEIGHT * WIDTH, True), (0, 3 * HEIGHT * WIDTH, False)):
+        found = apng.read(encoded([(0, 0, whole, 0, 0), (0, 0, whole, 0, blend), (0, 0, whole, 0, blend)]))
+        assert found is not None
+        assert found.has_alpha(most) == seen
 
 
 @pytest.mark.parametrize("colour", [0, 2, 4, 6])
@@ -235,6 +245,36 @@ def test_what_a_gif_clears_is_transparent_though_its_first_frame_is_opaque(tmp_p
         np.testing.assert_array_equal(read.pixels[seen], wanted[seen])
     (_, later), *_ = clip.pictures((2, None))
     np.testing.assert_array_equal(later.pixels[..., 3], composed(over)[2][..., 3])
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_frames_of_a_gif_are_laid_over_one_another_as_browsers_do_it(tmp_path: Path, seed: int):
+    """By the law in float64: frames that cover a part, beside or beyond the picture, with a key or none."""
+    rng = np.random.default_rng(seed)
+    colours = rng.integers(0, 256, (8, 3))
+    parts, wanted = [], list[Part]()
+    for number in range(6):
+        x, y = (int(rng.integers(0, most)) for most in (WIDTH + 3, HEIGHT + 3))
+        width, height = (int(rng.integers(1, most)) for most in (WIDTH, HEIGHT))
+        if number == 0:
+            x, y, width, height = (0, 0, WIDTH, HEIGHT) if seed % 2 else (2, 1, WIDTH - 3, HEIGHT - 2)
+        numbers = rng.integers(0, 8, (height, width))
+        disposal, key = int(rng.integers(4)), 3 if rng.integers(2) else None
+        parts.append((x, y, numbers, disposal, key))
+        alpha = np.where(numbers == key, 0, 255)[..., None]
+        seen = np.dstack([colours[numbers], alpha])[: max(HEIGHT - y, 0), : max(WIDTH - x, 0)]
+        wanted.append((x, y, seen, {2: 1, 3: 2}.get(disposal, 0), 1))
+    (path := tmp_path / "a.gif").write_bytes(gif(parts, colours))
+    clip = read_pages(path, first := read_picture(path))
+    assert clip is not None
+    canvases = composed(wanted)
+    assert clip.alpha == any(canvas[..., 3].min() < 255 for canvas in canvases)
+    for read, canvas in zip(
+        [first, *(picture for _, picture in clip.pictures())], [canvases[0], *canvases], strict=True
+    ):
+        seen = canvas[..., 3] > 0
+        np.testing.assert_array_equal(read.pixels[..., 3] > 0 if read.has_alpha else np.ones_like(seen), seen)
+        np.testing.assert_array_equal(read.pixels[..., :3][seen], canvas[..., :3][seen])
 
 
 def test_a_still_is_no_animation(tmp_path: Path):

@@ -6,6 +6,7 @@ import json
 import math
 import os
 import subprocess
+from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from PIL import Image
 
 from app.errors import UserError
 from app.media.clip import CHANGED
+from app.media.codecs import pillow, tiff
 from app.media.displacement import Displacement
 from app.media.maps import write_map
 from app.media.source import open_source
@@ -134,16 +136,38 @@ def test_pages_of_a_tiff_become_a_sequence(device: Device, tmp_path: Path, dtype
     """Each with its own depth; a smaller version and a mask among them are no frames."""
     scale = 1 / 255 if dtype == np.float32 else 257 if dtype == np.uint16 else 1
     pages = [(picture(number) * np.float64(scale)).astype(dtype) for number in range(4)]
-    with tifffile.TiffWriter(tmp_path / "a.tif") as tiff:
+    with tifffile.TiffWriter(tmp_path / "a.tif") as writer:
         for number, page in enumerate(pages):
-            tiff.write(page, photometric="rgb", metadata=None)
+            writer.write(page, photometric="rgb", metadata=None)
             if number == 1:
-                tiff.write(page[::2, ::2], photometric="rgb", subfiletype=1, metadata=None)
+                writer.write(page[::2, ::2], photometric="rgb", subfiletype=1, metadata=None)
     notices = applied(device, tmp_path, tmp_path / "a.tif", "b.%02d.tif")
     assert notices == ()
     for number, page in enumerate(pages):
         np.testing.assert_array_equal(tifffile.imread(tmp_path / f"b.{number:02d}.tif"), page)
     assert not (tmp_path / "b.04.tif").exists()
+
+
+@pytest.mark.parametrize("ending", [".gif", ".apng", ".webp", ".tif"])
+def test_a_clip_is_opened_once_for_all_its_frames(tmp_path: Path, ending: str, monkeypatch: pytest.MonkeyPatch):
+    """Once for each, of many frames the time grew with the square."""
+    if ending == ".tif":
+        with tifffile.TiffWriter(tmp_path / "a.tif") as writer:
+            for number in range(5):
+                writer.write(picture(number), photometric="rgb", metadata=None)
+    else:
+        animated(tmp_path / f"a{ending}")
+    clip = open_source(tmp_path / f"a{ending}").clip
+    assert clip is not None
+    opened = list[Any]()
+
+    def counting(open_it: Callable[..., Any]) -> Callable[..., Any]:
+        return lambda *args: opened.append(args) or open_it(*args)
+
+    for module in (tiff, pillow):
+        monkeypatch.setattr(module, "opened", counting(module.opened))
+    assert len(list(clip.pictures((1, None), is_kept=lambda number: number == 2))) == 3
+    assert len(opened) == 1
 
 
 def test_a_still_takes_the_first_and_says_so(device: Device, tmp_path: Path):
@@ -169,9 +193,9 @@ def test_a_recipe_moves_with_the_durations(device: Device, tmp_path: Path):
 @pytest.mark.parametrize("name", ["a.gif", "a.apng", "a.webp", "a.tif"])
 def test_what_is_damaged_in_the_middle_is_told(device: Device, tmp_path: Path, name: str):
     if name == "a.tif":
-        with tifffile.TiffWriter(tmp_path / name) as tiff:
+        with tifffile.TiffWriter(tmp_path / name) as writer:
             for number in range(5):
-                tiff.write(picture(number), photometric="rgb", metadata=None, compression="zlib")
+                writer.write(picture(number), photometric="rgb", metadata=None, compression="zlib")
     else:
         animated(tmp_path / name)
     data = (tmp_path / name).read_bytes()
@@ -181,9 +205,9 @@ def test_what_is_damaged_in_the_middle_is_told(device: Device, tmp_path: Path, n
 
 
 def test_pages_of_several_sizes_are_told(device: Device, tmp_path: Path):
-    with tifffile.TiffWriter(tmp_path / "a.tif") as tiff:
-        tiff.write(picture(0), photometric="rgb", metadata=None)
-        tiff.write(picture(1)[:-4], photometric="rgb", metadata=None)
+    with tifffile.TiffWriter(tmp_path / "a.tif") as writer:
+        writer.write(picture(0), photometric="rgb", metadata=None)
+        writer.write(picture(1)[:-4], photometric="rgb", metadata=None)
     with pytest.raises(UserError, match=r"a\.tif: frame 1 has 40 x 20 pixels of 3 x 8 bits, unlike the first"):
         applied(device, tmp_path, tmp_path / "a.tif", "b.mp4")
     with pytest.raises(UserError, match="it has the frames 0-1, and none from 7 on"):

@@ -15,6 +15,7 @@ from app.media.losses import few
 
 SIGNATURE = 8
 KEPT = (b"PLTE", b"tRNS")
+ALPHA = 4  # in the kind of samples that the header tells
 HUNDREDTHS = 100  # of a second are the steps of a frame that names none
 
 
@@ -69,9 +70,9 @@ def _frame(control: bytes, head: bytes, kept: Sequence[tuple[bytes, bytes]], pie
         raise ValueError("a frame of it reaches beyond the picture")
     chunks = [(b"IHDR", struct.pack(">II", width, height) + head[8:]), *kept]
     chunks += [*((b"IDAT", piece) for piece in pieces), (b"IEND", b"")]
-    file = b"".join(
-        struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(body, zlib.crc32(kind)))
-        for kind, body in chunks
-    )
+    file = [b"\x89PNG\r\n\x1a\n"]
+    for kind, body in chunks:
+        file += struct.pack(">I", len(body)) + kind, body, struct.pack(">I", zlib.crc32(body, zlib.crc32(kind)))
     seconds = Fraction(above, below or HUNDREDTHS)
-    return Frame(x, y, width, height, seconds, disposal, blend == 1, b"\x89PNG\r\n\x1a\n" + file)
+    is_opaque = not head[9] & ALPHA and all(kind != b"tRNS" for kind, _ in kept)
+    return Frame(x, y, width, height, seconds, disposal, blend == 1, tuple(file), is_opaque, width * height)

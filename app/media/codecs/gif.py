@@ -1,33 +1,66 @@
-"""The frames of a GIF (GIF89a) that clear what they have drawn though the first of them is opaque.
+"""GIF (GIF87a and 89a): a still, and the frames of an animation, laid over one another as browsers do it.
 
-Of these Pillow's picture has no alpha, and what is cleared gets the colour whose number means transparent.
+What no frame covers, or one clears, is transparent. Pillow gives some of it the file's background colour, and lets a
+frame that does not say what becomes of it fare as the one before it.
 """
 
 from __future__ import annotations
 
 import struct
 from collections.abc import Iterator
+from dataclasses import replace
 from fractions import Fraction
+from pathlib import Path
 
+import numpy as np
+
+from app.media.codecs import pillow
 from app.media.codecs.layered import BACKGROUND, NONE, PREVIOUS, Animation, Frame
+from app.model.picture import Picture
 
-CONTROL, IMAGE, EXTENSION = 0xF9, 0x2C, 0x21
+CONTROL, IMAGE, EXTENSION, END = 0xF9, 0x2C, 0x21, 0x3B
 HEAD = 13  # bytes of the header and the screen
 
 
-def read(data: bytes) -> Animation | None:
-    """What is in such a file; None of any other, which Pillow reads rightly, or that is damaged."""
+def read(file: Path, max_pixels: int) -> Picture:
+    """The first frame of a GIF."""
+    with pillow.opened("GIF", file, max_pixels) as image:
+        left, top, right, bottom = image.tile[0][1]
+        if (left, top, right, bottom) == (0, 0, *image.size):
+            return pillow.picture_of(image, file, [])
+        pixels = np.zeros((image.height, image.width, 4), np.uint8)
+        place = slice(top, bottom), slice(left, right)
+        pixels[place] = np.asarray(image.convert("RGBA"))[place]
+        return pillow.picture_of(image, file, [], pixels)
+
+
+def frames(data: bytes, loop: int | None) -> Animation | None:
+    """What is in a file; None if it is no animation. Raises `ValueError` if it is damaged.
+
+    loop: how often the file says that it begins again, 0 for ever; None if it does not say.
+    """
     try:
-        size: tuple[int, int] = struct.unpack_from("<HH", data, 6)
         table = _table(data, HEAD, data[10])
-        frames = list(_frames(data, HEAD + len(table), data[:10] + data[10:HEAD] + table))
+        found = list(_frames(data, HEAD + len(table), table))
+        width, height = struct.unpack_from("<HH", data, 6)
     except (IndexError, struct.error):
+        raise ValueError("a frame of it is cut") from None
+    if len(found) < 2:
         return None
-    if not frames or (frames[0].x, frames[0].y, frames[0].width, frames[0].height) != (0, 0, *size):
-        return None
-    clears = [frame.disposal == BACKGROUND and frame.is_over for frame in frames[:-1]]
-    is_beyond = any(frame.x + frame.width > size[0] or frame.y + frame.height > size[1] for frame in frames)
-    return None if frames[0].is_over or is_beyond or not any(clears) else Animation(size, frames, 0)
+    size = max(width, found[0].x + found[0].width), max(height, found[0].y + found[0].height)
+    return Animation(size, [_within(frame, size) for frame in found], 1 if loop is None else loop + 1 if loop else 0)
+
+
+def _within(frame: Frame, size: tuple[int, int]) -> Frame:
+    """A frame without what of it is beyond the picture."""
+    width, height = (
+        max(0, min(length, most - at))
+        for length, most, at in (
+            (frame.width, size[0], frame.x),
+            (frame.height, size[1], frame.y),
+        )
+    )
+    return frame if (width, height) == (frame.width, frame.height) else replace(frame, width=width, height=height)
 
 
 def _table(data: bytes, at: int, flags: int) -> bytes:
@@ -35,25 +68,32 @@ def _table(data: bytes, at: int, flags: int) -> bytes:
     return data[at : at + 3 * 2 ** ((flags & 7) + 1)] if flags & 0x80 else b""
 
 
-def _frames(data: bytes, at: int, head: bytes) -> Iterator[Frame]:
-    control = bytes(4)
-    while at < len(data) and data[at] in (IMAGE, EXTENSION):
+def _frames(data: bytes, at: int, common: bytes) -> Iterator[Frame]:
+    """The frames from a place on; those without a table of their own have the common one."""
+    control, kinds = bytes(4), {2: BACKGROUND, 3: PREVIOUS}
+    while at < len(data) and data[at] != END:
         if data[at] == EXTENSION:
             if data[at + 1] == CONTROL:
                 control = data[at + 3 : at + 7]
             at = _after_blocks(data, at + 2)
-            continue
-        x, y, width, height, flags = struct.unpack_from("<HHHHB", data, at + 1)
-        table = _table(data, at + 10, flags)
-        end = _after_blocks(data, at + 11 + len(table))
-        screen = head[:6] + struct.pack("<HH", width, height) + head[10:]
-        own = struct.pack("<BHHHHB", IMAGE, 0, 0, width, height, flags)
-        has_key, disposal = control[0] & 1, control[0] >> 2 & 7
-        file = screen + bytes([EXTENSION, CONTROL, 4, control[0] & 1, 0, 0, control[3], 0]) + own + data[at + 10 : end]
-        kinds = {2: BACKGROUND, 3: PREVIOUS}
-        seconds = Fraction(int.from_bytes(control[1:3], "little"), 100)
-        yield Frame(x, y, width, height, seconds, kinds.get(disposal, NONE), bool(has_key), file + b";")
-        at, control = end, bytes(4)
+        elif data[at] == IMAGE:
+            x, y, width, height, flags = struct.unpack_from("<HHHHB", data, at + 1)
+            table = _table(data, at + 10, flags)
+            end = _after_blocks(data, at + 11 + len(table))
+            has_key, disposal = bool(control[0] & 1), kinds.get(control[0] >> 2 & 7, NONE)
+            seconds = Fraction(int.from_bytes(control[1:3], "little"), 100)
+            pieces = (
+                struct.pack("<6sHHBBB", data[:6], width, height, data[10], 0, 0),
+                common,
+                bytes([EXTENSION, CONTROL, 4, has_key, 0, 0, control[3], 0]),
+                struct.pack("<BHHHHB", IMAGE, 0, 0, width, height, flags),
+                data[at + 10 : end],
+                bytes([END]),
+            )
+            yield Frame(x, y, width, height, seconds, disposal, True, pieces, not has_key, width * height)
+            at, control = end, bytes(4)
+        else:  # between blocks Pillow passes over what is none
+            at += 1
 
 
 def _after_blocks(data: bytes, at: int) -> int:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 
@@ -13,9 +15,10 @@ from app.media.codecs.png import spread_key
 
 NONE, BACKGROUND, PREVIOUS = range(3)  # what becomes of a frame when the next one comes
 PNG_BITS = 24  # the place of the bits a channel in a PNG
+AT_ONCE = 2**20  # pixels that are mixed: in floats they take many times the memory
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Frame:
     """A frame as the file has it.
 
@@ -24,7 +27,9 @@ class Frame:
         seconds: that it is shown.
         disposal: one of the three above.
         is_over: it is laid over what is there, and does not replace it.
-        file: a PNG or GIF of it alone.
+        pieces: of a file, PNG or GIF, of it alone.
+        is_opaque: nothing of it can be seen through, by the kind of its samples.
+        pixels: of that file, which may reach beyond its place.
     """
 
     x: int
@@ -34,7 +39,13 @@ class Frame:
     seconds: Fraction
     disposal: int
     is_over: bool
-    file: bytes
+    pieces: tuple[bytes, ...]
+    is_opaque: bool
+    pixels: int
+
+    @property
+    def is_empty(self) -> bool:
+        return not (self.width and self.height)
 
     def covers(self, other: Frame) -> bool:
         """Whether nothing of the other's place is beyond its own."""
@@ -46,6 +57,11 @@ class Frame:
     def place(self) -> tuple[slice, slice]:
         return slice(self.y, self.y + self.height), slice(self.x, self.x + self.width)
 
+    def place_in(self, other: Frame) -> tuple[slice, slice]:
+        """Its place among the pixels of another that covers it."""
+        x, y = self.x - other.x, self.y - other.y
+        return slice(y, y + self.height), slice(x, x + self.width)
+
 
 @dataclass(frozen=True)
 class Animation:
@@ -55,47 +71,101 @@ class Animation:
     frames: Sequence[Frame]
     plays: int
 
-    def has_alpha(self) -> bool:
-        """Whether anything of any frame is seen through; only what a frame changes is looked at."""
-        cleared = Frame(0, 0, *self.size, Fraction(0), BACKGROUND, False, b"")  # as all is at first
-        found = False
-        for number, (frame, canvas) in enumerate(zip(self.frames, self.shown(), strict=True)):
-            is_bare = cleared is not None and not frame.covers(cleared)
-            found = found or is_bare or bool(canvas[frame.place][..., 3].min() < 255)
-            is_gone = frame.disposal == BACKGROUND or (frame.disposal == PREVIOUS and not number)
-            cleared = frame if is_gone else None
-        return found
+    def has_alpha(self, most: int) -> bool:
+        """Whether anything of any frame is seen through.
+
+        Only frames that may show it are decoded: not those that lie over what is opaque. Of an animation of which that
+        would be more than `most` pixels, it is believed that what can have alpha has it.
+        """
+        asked = list[tuple[Frame, tuple[slice, slice]]]()
+        cleared: Frame | None = Frame(
+            0, 0, *self.size, Fraction(0), BACKGROUND, False, (), False, 0
+        )  # as all is at first
+        for number, frame in enumerate(self.frames):
+            if cleared is not None and not frame.covers(cleared):
+                return True
+            if not frame.is_opaque and not frame.is_over:
+                asked.append((frame, (slice(None), slice(None))))
+            elif not frame.is_opaque and cleared is not None:
+                asked.append((frame, cleared.place_in(frame)))
+            if frame.disposal == BACKGROUND or (frame.disposal == PREVIOUS and not number):
+                cleared = None if frame.is_empty else frame
+            elif frame.disposal == NONE:
+                cleared = None
+        for frame, part in asked:
+            most -= frame.pixels
+            if not frame.is_empty and (most < 0 or _is_seen_through(frame, part)):
+                return True
+        return False
 
     def shown(self) -> Iterator[np.ndarray]:
         """What is seen of each frame in turn, (h, w, 4) uint8; the array is drawn on for the next."""
         canvas = np.zeros((self.size[1], self.size[0], 4), np.uint8)
         for number, frame in enumerate(self.frames):
-            before = canvas[frame.place].copy()
+            place = canvas[frame.place]
+            is_restored = frame.disposal == PREVIOUS and number > 0
+            before = place.copy() if is_restored else None
             drawn = _decoded(frame)
-            canvas[frame.place] = _over(drawn, before) if frame.is_over else drawn
+            band = AT_ONCE // max(frame.width, 1) + 1
+            for rows in (slice(row, row + band) for row in range(0, frame.height, band)):
+                place[rows] = _over(drawn[rows], place[rows]) if frame.is_over else drawn[rows]
+            del drawn
             yield canvas
-            if frame.disposal == PREVIOUS and number:
-                canvas[frame.place] = before
+            if before is not None:
+                place[:] = before
             elif frame.disposal != NONE:
-                canvas[frame.place] = 0
+                place[:] = 0
 
 
 def _decoded(frame: Frame) -> np.ndarray:
     """The pixels (h, w, 4) of a frame, in 8 bits."""
-    from PIL import Image
-
-    bits = frame.file[PNG_BITS] if frame.file.startswith(b"\x89PNG") else 8
-    if bits == 16:
-        import imagecodecs
-
-        deep = (imagecodecs.png_decode(frame.file) >> 8).astype(np.uint8)
-        deep = deep.reshape(frame.height, frame.width, -1)
+    if frame.is_empty:
+        return np.zeros((frame.height, frame.width, 4), np.uint8)
+    file = b"".join(frame.pieces)
+    if _bits(file) == 16:
+        deep = _deep(file)
         grey, alpha = deep.shape[2] < 3, deep.shape[2] in (2, 4)
         opaque = deep[..., -1:] if alpha else np.full_like(deep[..., :1], 255)
         return np.concatenate([deep[..., [0, 0, 0] if grey else [0, 1, 2]], opaque], axis=2)
-    with Image.open(io.BytesIO(frame.file), formats=["PNG", "GIF"]) as image:
-        spread_key(image, bits)
-        return np.asarray(image.convert("RGBA"))
+    with _opened(file) as image:
+        return np.asarray(image.convert("RGBA"))[: frame.height, : frame.width]
+
+
+def _is_seen_through(frame: Frame, part: tuple[slice, slice]) -> bool:
+    """Whether anything of a part of a frame's pixels is; nothing is made of them but this."""
+    file = b"".join(frame.pieces)
+    rows, columns = (range(length)[one] for length, one in zip((frame.height, frame.width), part, strict=True))
+    if _bits(file) == 16:
+        deep = _deep(file)
+        return deep.shape[2] in (2, 4) and bool(deep[part][..., -1].min() < 255)
+    with _opened(file) as image:
+        image = image.crop((columns.start, rows.start, columns.stop, rows.stop))
+        if image.mode == "P" and isinstance(key := image.info.get("transparency"), int):
+            return image.histogram()[key] > 0
+        if image.mode not in ("LA", "RGBA"):
+            image = image.convert("RGBA")
+        return image.getchannel("A").getextrema()[0] < 255
+
+
+def _bits(file: bytes) -> int:
+    return file[PNG_BITS] if file.startswith(b"\x89PNG") else 8
+
+
+def _deep(file: bytes) -> np.ndarray:
+    """The upper 8 of the 16 bits of a PNG, (h, w, channels)."""
+    import imagecodecs
+
+    deep: np.ndarray = imagecodecs.png_decode(file)
+    return (deep[..., None] if deep.ndim == 2 else deep).astype("<u2", copy=False).view(np.uint8)[..., 1::2]
+
+
+@contextmanager
+def _opened(file: bytes) -> Iterator[Any]:
+    from PIL import Image
+
+    with Image.open(io.BytesIO(file), formats=["PNG", "GIF"]) as image:
+        spread_key(image, _bits(file))
+        yield image
 
 
 def _over(drawn: np.ndarray, below: np.ndarray) -> np.ndarray:

@@ -43,9 +43,12 @@ def opened(name: str, file: Path, max_pixels: int) -> Iterator[Any]:
             Image.MAX_IMAGE_PIXELS = max(max_pixels // 2, 1)  # a later frame is refused beyond twice this
             yield image
         except Image.DecompressionBombError:
-            raise UserError(
-                f"Cannot read {file}: a frame of it has more than the limit of {max_pixels} pixels; get it again."
-            ) from None
+            raise too_large(file, max_pixels) from None
+
+
+def too_large(file: Path, max_pixels: int) -> UserError:
+    """What is said of a file of which a later frame is larger than a picture may be."""
+    return UserError(f"Cannot read {file}: a frame of it has more than the limit of {max_pixels} pixels; get it again.")
 
 
 def picture_of(image: Any, file: Path, losses: list[str], pixels: np.ndarray | None = None) -> Picture:

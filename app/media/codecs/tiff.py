@@ -8,7 +8,7 @@ import os
 import re
 import struct
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -51,12 +51,19 @@ COLOURS = {"MINISBLACK": 1, "MINISWHITE": 1, "PALETTE": 1, "SEPARATED": 4}
 LAYOUT = re.compile(r'\s*\{"shape": ?\[|ImageJ=|.{0,400}<OME[\s>]', re.DOTALL)
 
 
-def pages_of(file: Path) -> list[int]:
-    """Which of a TIFF's pages are pictures: neither smaller versions nor masks."""
+@contextmanager
+def opened(file: Path) -> Iterator[Any]:
+    """tifffile's object of a TIFF, whose pages are found one after the other."""
     import tifffile
 
-    tifffile.logger().setLevel(logging.CRITICAL)
+    tifffile.logger().setLevel(logging.CRITICAL)  # what it says of damaged files, it raises too
     with tifffile.TiffFile(file) as tiff:
+        yield tiff
+
+
+def pages_of(file: Path) -> list[int]:
+    """Which of a TIFF's pages are pictures: neither smaller versions nor masks."""
+    with opened(file) as tiff:
         return [place for place, page in enumerate(_pages(tiff)) if not page.subfiletype & 5]
 
 
@@ -72,10 +79,7 @@ def _pages(tiff: Any) -> Iterator[Any]:
 
 def head(file: Path, max_pixels: int) -> tuple[int, int, str]:
     """The width and height of a TIFF's first page once it is upright, and its description."""
-    import tifffile
-
-    tifffile.logger().setLevel(logging.CRITICAL)
-    with tifffile.TiffFile(file) as tiff:
+    with opened(file) as tiff:
         page: Any = tiff.pages[0]
         size = page.imagewidth, page.imagelength
         check_size(file, *size, max_pixels, page.samplesperpixel)
@@ -85,37 +89,39 @@ def head(file: Path, max_pixels: int) -> tuple[int, int, str]:
         return *size, page.description
 
 
-def read(file: Path, max_pixels: int, place: int | None = None) -> Picture:
-    """Read a page of a TIFF; where none is asked for the first, and what is lost of the others is told."""
+def read(file: Path, max_pixels: int) -> Picture:
+    """Read the first page of a TIFF; what is lost of the others is told."""
+    with opened(file) as tiff:
+        return page_of(tiff, file, max_pixels)
+
+
+def page_of(tiff: Any, file: Path, max_pixels: int, place: int | None = None) -> Picture:
+    """A page of an open TIFF; where none is asked for the first, and what is lost of the others is told."""
     import tifffile
 
-    tifffile.logger().setLevel(logging.CRITICAL)  # what it says of damaged files, it raises too
-    with tifffile.TiffFile(file) as tiff:
-        page: Any = tiff.pages[place or 0]
-        check_size(file, page.imagewidth, page.imagelength, max_pixels, page.samplesperpixel)
-        tags = {tag.code: tag.value for tag in page.tags}
-        samples = [axis for axis in page.axes if axis in "YXS"]
-        if "".join(sorted(samples)) not in ("XY", "SXY") or page.axes.strip("YXS"):
-            raise UserError(f"Cannot read {file}: a TIFF of axes {page.axes} is not a picture; save one page of it.")
-        pieces = math.prod(page.chunked)
-        if not page.is_contiguous and len(page.dataoffsets) < pieces:  # tifffile fills what is missing with zeros
-            raise ValueError(f"it has {len(page.dataoffsets)} of its {pieces} strips or tiles")
-        photometric = tifffile.PHOTOMETRIC(page.photometric).name
-        if photometric == "YCBCR" and int(page.compression) not in DECODED:
-            raise UserError(f"Cannot read {file}: a TIFF in YCbCr is not supported but as JPEG; convert it to RGB.")
-        told = page.bitspersample
-        bits = told if isinstance(told, int) else 0
-        if not bits or 16 < bits < 32:  # of which tifffile does not heed the order of bytes
-            named = str(told).strip("()")
-            raise UserError(
-                f"Cannot read {file}: {named} bits a channel of a TIFF are not supported; convert it to 16."
-            )
-        losses = _losses(tiff) if place is None else []
-        if unkept := [tag.name for tag in page.tags if tag.code not in UNDERSTOOD]:
-            losses.append(not_kept("tag", unkept))
-        pixels = page.asarray()
-        losses += _cut(pixels, bits)
-        place_of_tags, layout = page.offset, (tiff.byteorder, tiff.is_bigtiff)
+    page: Any = tiff.pages[place or 0]
+    check_size(file, page.imagewidth, page.imagelength, max_pixels, page.samplesperpixel)
+    tags = {tag.code: tag.value for tag in page.tags}
+    samples = [axis for axis in page.axes if axis in "YXS"]
+    if "".join(sorted(samples)) not in ("XY", "SXY") or page.axes.strip("YXS"):
+        raise UserError(f"Cannot read {file}: a TIFF of axes {page.axes} is not a picture; save one page of it.")
+    pieces = math.prod(page.chunked)
+    if not page.is_contiguous and len(page.dataoffsets) < pieces:  # tifffile fills what is missing with zeros
+        raise ValueError(f"it has {len(page.dataoffsets)} of its {pieces} strips or tiles")
+    photometric = tifffile.PHOTOMETRIC(page.photometric).name
+    if photometric == "YCBCR" and int(page.compression) not in DECODED:
+        raise UserError(f"Cannot read {file}: a TIFF in YCbCr is not supported but as JPEG; convert it to RGB.")
+    told = page.bitspersample
+    bits = told if isinstance(told, int) else 0
+    if not bits or 16 < bits < 32:  # of which tifffile does not heed the order of bytes
+        named = str(told).strip("()")
+        raise UserError(f"Cannot read {file}: {named} bits a channel of a TIFF are not supported; convert it to 16.")
+    losses = _losses(tiff) if place is None else []
+    if unkept := [tag.name for tag in page.tags if tag.code not in UNDERSTOOD]:
+        losses.append(not_kept("tag", unkept))
+    pixels = page.asarray()
+    losses += _cut(pixels, bits)
+    place_of_tags, layout = page.offset, (tiff.byteorder, tiff.is_bigtiff)
     is_half = pixels.dtype == np.float16
     pixels = np.moveaxis(pixels, 0, -1) if page.axes == "SYX" else pixels.reshape(*pixels.shape[:2], -1)
     pixels = plain_depth(file, pixels, bits if photometric != "PALETTE" else None)
