@@ -800,7 +800,7 @@ def test_of_a_file_that_is_gone_it_is_told_that_the_recipe_names_it(
 ):
     (folder / "b.toml").write_text(more + RECIPE if not where else RECIPE + more)
     ran = fluidwarp(folder, "render", "b.toml", "-o", "z.png")
-    named = r"which the recipe names: there is no such file; check the name, or put it back\.\n"
+    named = r"which \S*b\.toml names: there is no such file; check the name, or put it back\.\n"
     assert re.fullmatch(rf"fluidwarp: {where}.*Cannot read \S*gone\.\w+, {named}", ran.stderr)
 
 

@@ -25,12 +25,16 @@ class Pictures:
         source: the picture that is warped.
         folder: where relative names of auxiliary pictures start from.
         clip: the one that `source` is the first frame of.
+        label: what the recipe is called that names them.
     """
 
-    def __init__(self, source: Picture, folder: str | Path = ".", clip: Clip | None = None) -> None:
+    def __init__(
+        self, source: Picture, folder: str | Path = ".", clip: Clip | None = None, label: str = "the recipe"
+    ) -> None:
         self.source = source
         self.clip = clip
         self.folder = Path(folder)
+        self.label = label
         self.notices: list[str] = [source.note] if source.note else []
         self._read: dict[str, Picture] = {}
         self._maps: dict[str, np.ndarray] = {}
@@ -44,7 +48,7 @@ class Pictures:
         if name == SOURCE:
             return self._frame(frame) if frame else self.source
         if name not in self._read:
-            with named_in("the recipe", self.folder / name):
+            with named_in(self.label, self.folder / name):
                 picture = self._read[name] = read_picture(self.folder / name)
             if picture.note:
                 self.notice(picture.note)
@@ -64,7 +68,7 @@ class Pictures:
         """
         if name not in self._maps:
             size = self.source.width, self.source.height
-            with named_in("the recipe", self.folder / name):
+            with named_in(self.label, self.folder / name):
                 given = read_map(self.folder / name, picture=size)
             if given.forward:
                 forward = f"{name} tells where each point goes"

@@ -350,7 +350,14 @@ def _attributes(picture: Picture, room: Room) -> str:
     return counted("attribute", names) if names else ""
 
 
+def _grey(picture: Picture, room: Room) -> str:
+    """Of an EXR the channels have names, and grey with alpha is written as colours."""
+    is_named = bool(picture.parts) and room.kind is not None and room.kind.name == "OpenEXR"
+    return "has the picture's Y and A as R, G, B and A" if is_named and picture.pixels.shape[2] == 2 else ""
+
+
 TABLE: dict[str, Told] = {
+    "grey": _grey,
     "bits": _depth,
     "below": _below,
     "above": _above,

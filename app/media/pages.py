@@ -142,6 +142,8 @@ def read_pages(path: Path, first: Picture, max_pixels: int = MAX_PIXELS) -> Page
         return None
     channels = first.pixels.shape[2] if kind.name == "TIFF" else 3 + alpha
     bits = first.bits if kind.name == "TIFF" else 8
+    losses = ["its 16 bits a channel become 8"] if first.bits > bits else []
+    losses += gif.unkept(head_of(path)) if kind.name == "GIF" else []
     rate, steps = _steps(durations) if durations else (None, None)
     return Pages(
         path=path,
@@ -156,7 +158,7 @@ def read_pages(path: Path, first: Picture, max_pixels: int = MAX_PIXELS) -> Page
         loops=loops,
         is_whole=kind.name == "TIFF",
         is_linked=False,
-        note=lost(path, ["its 16 bits a channel become 8"] if first.bits > bits else []),
+        note=lost(path, losses),
         kind=kind.name,
         places=tuple(places),
         max_pixels=max_pixels,

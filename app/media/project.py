@@ -41,6 +41,7 @@ class Project:
         data: the bytes of the file it was read from, so that it can be saved when that file is gone; of a clip that is
             only referred to, what it is known again by.
         clip: what is warped, where it moves.
+        label: what the recipe is called that names them.
         folder: where the recipe's names start from; a temporary one for a project that holds its pictures.
         path: the project's own file, if it has one.
         seen: that file as it was when it was read or written last; None where that was not by this project.
@@ -57,6 +58,7 @@ class Project:
     keeper: tempfile.TemporaryDirectory[str] | None = field(default=None, repr=False)
     clip: Clip | None = field(default=None, repr=False)
     seen: tuple[int, ...] | None = field(default=None, repr=False)
+    label: str = "the recipe"
 
     @property
     def is_overtaken(self) -> bool:
@@ -109,7 +111,7 @@ def from_recipe(path: str | os.PathLike[str]) -> Project:
         raise UserError(f"{path} names no picture; open a picture first, then apply the recipe to it")
     with named_in(path, path.parent / recipe.picture):
         source, data = read_source(path.parent / recipe.picture)
-    return Project(recipe, source.picture, data, path.parent, clip=source.clip)
+    return Project(recipe, source.picture, data, path.parent, clip=source.clip, label=str(path))
 
 
 @contextmanager
@@ -210,7 +212,9 @@ def _read(path: Path, archive: Archive, max_pixels: int) -> Project:
     if not embedded:
         with named_in(path, path.parent / recipe.picture):
             source, data = read_source(path.parent / recipe.picture, max_pixels)
-        return Project(recipe, source.picture, data, path.parent, path, embedded=False, clip=source.clip)
+        return Project(
+            recipe, source.picture, data, path.parent, path, embedded=False, clip=source.clip, label=str(path)
+        )
     if sum(archive.getinfo(name).file_size for name in held) > MOST_BYTES:
         raise UserError(f"{path} holds pictures of more than {MOST_BYTES >> 30} GB")
     keeper = temporary_folder()
@@ -223,7 +227,7 @@ def _read(path: Path, archive: Archive, max_pixels: int) -> Project:
         source = open_source(file, max_pixels)
     except UserError as error:  # the temporary folder is nobody's business
         raise UserError(str(error).replace(shown(str(file)), f"{recipe.picture} in {path}")) from None
-    return Project(recipe, source.picture, data, folder, path, keeper=keeper, clip=source.clip)
+    return Project(recipe, source.picture, data, folder, path, keeper=keeper, clip=source.clip, label=str(path))
 
 
 def _packed(project: Project) -> tuple[Recipe, dict[str, bytes]]:

@@ -79,7 +79,15 @@ class Fits:
         self._session, self._of, self._stopping = session, session.recipe, False
         project = session.project
         self.process = FitProcess(
-            Fit(recipe, project.picture, project.folder, pairs, self.evaluations, clip=project.clip)
+            Fit(
+                recipe,
+                project.picture,
+                project.folder,
+                pairs,
+                self.evaluations,
+                clip=project.clip,
+                source=project.label,
+            )
         )
 
     def finish(self) -> None:

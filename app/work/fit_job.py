@@ -35,6 +35,7 @@ class Fit:
     evaluations: int = EVALUATIONS
     local: float | None = None
     clip: Clip | None = None
+    source: str = "the recipe"
 
     @property
     def label(self) -> str:
@@ -44,7 +45,7 @@ class Fit:
     def perform(self, device: Device, progress: Progress) -> Fitted:
         """Do it. Raises `UserError`, and `Cancelled` if nothing has been found yet."""
         check_picture(self.picture)
-        how = self.evaluations, self.local, self.clip
+        how = self.evaluations, self.local, self.clip, self.source
         return fitted(device, self.recipe, self.picture, self.folder, self.pairs, progress, *how)
 
 
@@ -109,7 +110,8 @@ class FitJob:
         picture = source.picture
         size = picture.width, picture.height
         pairs, notices = pairs_in(self.pairs, self.masks, size)
-        fit = Fit(self._placed(found), picture, found.folder, pairs, self.evaluations, self.local, source.clip)
+        how = self.evaluations, self.local, source.clip, found.label
+        fit = Fit(self._placed(found), picture, found.folder, pairs, *how)
         done = fit.perform(device, progress)
         with replacing(self.output) as temporary:
             temporary.write_text(done.trial.recipe.text(), encoding="utf-8")

@@ -137,6 +137,7 @@ def fitted(
     evaluations: int = EVALUATIONS,
     local: float | None = None,
     clip: Clip | None = None,
+    label: str = "the recipe",
 ) -> Fitted:
     """The recipe with a handle for each pair, its values searched for the least work that reaches them without a fold.
 
@@ -154,12 +155,13 @@ def fitted(
         evaluations: replays on the coarse grid.
         local: of all handles; None is 1 where there are curves, 0 of points, and the recipe's own keep theirs.
         clip: the one that the picture is the first frame of.
+        label: what the recipe is called.
 
     Raises:
         UserError: if no pair lies in the picture, or there are too many.
         Cancelled: if it is stopped before anything has been found.
     """
-    pictures = Pictures(picture, folder, clip)
+    pictures = Pictures(picture, folder, clip, label)
     aim = _aimed(device, recipe, pictures, pairs, progress)
     if local is not None:
         leads = (replace(lead, handle=lead.handle.model_copy(update={"local": local})) for lead in aim.leads)
@@ -476,7 +478,7 @@ class _Search:
         self.hopeful = self._reachable()
         apart = -(-self.longer // COARSE_PICTURE)
         small = replace(picture, pixels=np.ascontiguousarray(picture.pixels[::apart, ::apart]))
-        coarse = _Stage(_coarse(base), Pictures(small, pictures.folder, pictures.clip))
+        coarse = _Stage(_coarse(base), Pictures(small, pictures.folder, pictures.clip, pictures.label))
         if apart == 1 and coarse.recipe == base:
             self.fine = coarse
         self.coarse = coarse

@@ -166,6 +166,7 @@ class Job:
         outputs: what is written.
         clip: the source, where it moves: its frames are warped by W_t at its own rate, its sound is carried over.
         frame: of a picture, the frame of a clip that is warped, by its number, where it is not `picture`.
+        named_by: what the recipe is called, for what is told of the files it names.
     """
 
     recipe: Recipe
@@ -174,6 +175,7 @@ class Job:
     outputs: Outputs
     clip: Clip | None = None
     frame: tuple[Clip, int] | None = None
+    named_by: str = "the recipe"
 
     @property
     def target(self) -> Path:

@@ -57,7 +57,7 @@ class Recording:
         self.device = device
         self.project = project
         self.document = Document(project.recipe)
-        self.pictures = Pictures(project.picture, project.folder, project.clip)
+        self.pictures = Pictures(project.picture, project.folder, project.clip, project.label)
         self.replay = Replay(device, project.recipe, self.pictures, BUDGET)
         self.playing = False
         self.coasting = False

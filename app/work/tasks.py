@@ -172,7 +172,8 @@ class Task(Piece):
         self.check_names(read if file is None else [*read, file])
         animated = self.outputs.has_frames or bool(frame_numbers(own))
         source = found.source(self.picture, self.max_pixels, animated)
-        return Job(self.edits.applied(found.recipe), source.picture, found.folder, self.outputs, source.clip)
+        recipe = self.edits.applied(found.recipe)
+        return Job(recipe, source.picture, found.folder, self.outputs, source.clip, named_by=found.label)
 
 
 def opened(name: str, max_pixels: int) -> Opened:

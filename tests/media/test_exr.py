@@ -13,6 +13,7 @@ import pytest
 from app.errors import UserError
 from app.media.codecs.exr import COMPRESSIONS
 from app.media.displacement import Displacement
+from app.media.holding import Losses, Written
 from app.media.maps import read_map, write_map
 from app.media.pictures import read_picture, write_picture
 from app.media.source import open_source
@@ -35,6 +36,17 @@ FILE_ATTRIBUTES: dict[str, Any] = {
     "screenWindowCenter": np.array([0.5, 0.25], np.float32),
     "a name of more than thirty-one letters": np.array([1.5, 2.5]),
 }  # fmt: skip
+
+
+def test_grey_with_alpha_becomes_colours_and_that_is_told(tmp_path: Path) -> None:
+    planes = {"Y": np.full((40, 30), 0.5, np.float32), "A": np.full((40, 30), 0.75, np.float32)}
+    picture = read_picture(saved(tmp_path / "a.exr", ({}, planes)))
+    for ending, said in ((".exr", "b.exr has the picture's Y and A as R, G, B and A"), (".tif", "")):
+        losses = Losses(tmp_path / f"b{ending}", Written())
+        write_picture(tmp_path / f"b{ending}", losses.look(picture))
+        assert losses.said.partition(";")[0] == said
+    names = OpenEXR.File(str(tmp_path / "b.exr"), separate_channels=True).channels()
+    assert sorted(names) == ["A", "B", "G", "R"]
 
 
 def noise(seed: int, dtype: type) -> np.ndarray:

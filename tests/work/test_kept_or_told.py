@@ -422,6 +422,23 @@ def animated_png(path: Path) -> Made:
     return {"pages": PAGES}
 
 
+@source(".exr")
+def marked_exr(path: Path) -> Made:
+    channels = {name: OpenEXR.Channel(name, smooth()[..., 0] / np.float32(255), 1, 1, name == "R") for name in "RGB"}
+    with path.open("wb") as stream:
+        OpenEXR.File({"type": OpenEXR.scanlineimage}, channels).write(stream)
+    return {"mark": always("its mark pLinear of channel R is not kept")}
+
+
+@source(".gif")
+def gif_of_wide_pixels(path: Path) -> Made:
+    Image.fromarray(smooth()).save(path)
+    data = bytearray(path.read_bytes())
+    data[12] = 113
+    path.write_bytes(data)
+    return {"shape": always(r"the shape of its pixels \(2:1\) is not kept")}
+
+
 @source(".gif")
 def animated_gif(path: Path) -> Made:
     further = [Image.fromarray(np.roll(smooth(), shift, 1)) for shift in (1, 2)]

@@ -212,7 +212,7 @@ def _parts(file: Path, max_pixels: int) -> list[_Part]:
                     if key not in LAYOUT and value.kind not in ("string", "preview")  # of the picture as it was
                 },
                 tuple(float(value) for value in primaries) if primaries is not None else None,
-                _unkept(raw),
+                _unkept(raw) + _unmarked(part.channels),
             )
         )
     return parts
@@ -223,6 +223,12 @@ def _unkept(raw: Mapping[str, Raw]) -> list[str]:
     has_levels = "tiles" in raw and raw["tiles"].data[-1] & 15  # the mode, after the size of a tile
     losses = ["its smaller versions (mipmaps) are not kept"] if has_levels else []
     return losses + (["its preview is not kept"] if any(value.kind == "preview" for value in raw.values()) else [])
+
+
+def _unmarked(channels: Mapping[str, Any]) -> list[str]:
+    """What the channels say of themselves and what is written does not; only B44 heeds it."""
+    names = [name for name, channel in channels.items() if channel.pLinear]
+    return [not_kept("mark pLinear of channel", names)] if names else []
 
 
 def _headers(file: Path, max_pixels: int) -> list[Any]:

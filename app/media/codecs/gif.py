@@ -16,6 +16,7 @@ import numpy as np
 
 from app.media.codecs import pillow
 from app.media.codecs.layered import BACKGROUND, NONE, PREVIOUS, Animation, Frame
+from app.media.inputs import read_start
 from app.model.picture import Picture
 
 CONTROL, IMAGE, EXTENSION, END = 0xF9, 0x2C, 0x21, 0x3B
@@ -26,12 +27,19 @@ def read(file: Path, max_pixels: int) -> Picture:
     """The first frame of a GIF."""
     with pillow.opened("GIF", file, max_pixels) as image:
         left, top, right, bottom = image.tile[0][1]
+        losses = unkept(read_start(file, "picture", HEAD))
         if (left, top, right, bottom) == (0, 0, *image.size):
-            return pillow.picture_of(image, file, [])
+            return pillow.picture_of(image, file, losses)
         pixels = np.zeros((image.height, image.width, 4), np.uint8)
         place = slice(top, bottom), slice(left, right)
         pixels[place] = np.asarray(image.convert("RGBA"))[place]
-        return pillow.picture_of(image, file, [], pixels)
+        return pillow.picture_of(image, file, losses, pixels)
+
+
+def unkept(head: bytes) -> list[str]:
+    """What the start of a file says that is not kept, in words: the shape of its pixels, width by height."""
+    aspect = Fraction(head[12] + 15, 64) if len(head) >= HEAD and head[12] else Fraction(1)
+    return [] if aspect == 1 else [f"the shape of its pixels ({float(aspect):g}:1) is not kept"]
 
 
 def frames(data: bytes, loop: int | None) -> Animation | None:
