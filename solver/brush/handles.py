@@ -171,6 +171,9 @@ class Handles:
         self._counts = np.zeros(0, int)
         self._lead: Lead | None = None  # of the present step
         self._sought: tuple[object, np.ndarray] | None = None  # where they are, and what that was found from
+        # Of the map as it leads, these points and where they are: it is laid on a window before they are led, and would
+        # have to be drawn and inverted again.
+        self._begins: tuple[int, np.ndarray, np.ndarray] | None = None
         self.replace(handles)
 
     def replace(self, handles: Iterable[Handle]) -> None:
@@ -193,6 +196,7 @@ class Handles:
         self._soft = 1 / self._stiffness - 1 + ridges
         self._places, self._starts = (self._fitted(kept, before) for kept in (self._places, self._starts))
         self._progress = self._fitted_progress(self._progress)
+        self._begins = None
 
     def go_on_with(self, fluid: Scheme) -> None:
         """From now on, move another fluid of the same picture: what lies outside its window stays by itself."""
@@ -220,8 +224,9 @@ class Handles:
         begun, in_force = self._in_force(time, dt)
         self._places = self._located()
         if (new := np.repeat(begun, self._counts) & np.isnan(self._starts[:, 0])).any():
-            self._places[new] = self._at[new] + self._forward.at(self._at[new])
-            self._starts[new] = self._places[new]
+            known, self._begins = self._begins, None
+            is_known = known is not None and known[0] == self._warp.leads and np.array_equal(known[1], new)
+            self._starts[new] = self._places[new] = known[2] if known is not None and is_known else self._where(new)
         in_force &= self._have_room()
         active, listed = np.flatnonzero(in_force).tolist(), np.flatnonzero(np.repeat(in_force, self._counts))
         if not active:
@@ -289,13 +294,14 @@ class Handles:
         self._fluid.impulse.add(lambda faces: self._push(lead, faces, lead.wanted))
 
     def ways(self, time: float, dt: float) -> list[Way]:
-        """Before a step at a time, of all that are in force in it; changes nothing."""
+        """Before a step at a time, of all that are in force in it; `lead` need not look for these again."""
         begun, in_force = self._in_force(time, dt)
         if not in_force.any():
             return []
         places, starts, near = self._located(), self._starts.copy(), 1 / max(self._warp.size)
         if (new := np.repeat(begun, self._counts) & np.isnan(starts[:, 0])).any():
-            starts[new] = places[new] = self._at[new] + self._forward.at(self._at[new])
+            starts[new] = places[new] = self._where(new)
+            self._begins = self._warp.leads, new, places[new]
         has_ended = any(abs(handle.last - time) <= dt / 2 for handle in self.handles)
         found = list[Way]()
         for number in np.flatnonzero(in_force).tolist():
@@ -447,7 +453,7 @@ class Handles:
             raise ValueError("the state of handles is missing")
         self._progress = self._fitted_progress(progress)
         self._expected.restore(state.fields.get(EXPECTED))
-        self._lead = None
+        self._lead = self._begins = None
 
     def release(self) -> None:
         """Free the textures."""
@@ -518,11 +524,15 @@ class Handles:
         places[begun] = best
         return places
 
+    def _where(self, listed: np.ndarray) -> np.ndarray:
+        """Where these points (n,) of the original are, (k, 2)."""
+        return self._at[listed] + self._forward.at(self._at[listed])
+
     def _located_or_waiting(self) -> np.ndarray:
         """Where the points of all handles are, or will begin, (n, 2)."""
         found, waiting = self._located(), np.isnan(self._starts[:, 0])
         if waiting.any():
-            found[waiting] = self._at[waiting] + self._forward.at(self._at[waiting])
+            found[waiting] = self._where(waiting)
         return found
 
     def _targets(self, active: list[int], listed: np.ndarray, time: float, dt: float) -> Targets:

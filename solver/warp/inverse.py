@@ -92,8 +92,9 @@ class ForwardMap:
 
     def _cells_at(self, near: np.ndarray, displacement: np.ndarray) -> Iterator[tuple[int, int]]:
         """The cells of the map that may be looked up in these texels of the guess: the first of each run, how many."""
-        wanted = np.zeros((self._guess.height, self._guess.width), np.int32)
-        wanted[near[..., 1], near[..., 0]] = 1
+        first, end = near.min(axis=(0, 1)), near.max(axis=(0, 1)) + 1
+        wanted = np.zeros((end - first)[::-1], np.int32)
+        wanted[near[..., 1] - first[1], near[..., 0] - first[0]] = 1
         up_to = np.pad(wanted.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))  # so many of them above and to the left
         size, ends, is_near = self._guess.size, list[np.ndarray](), True
         for axis, (count, side) in enumerate(zip(size, self._warp.extent, strict=True)):
@@ -106,10 +107,12 @@ class ForwardMap:
             is_near &= (ends[-2] <= near[..., axis].max() + 2) & (ends[-1] >= near[..., axis].min() - 1)
         numbers = np.flatnonzero(is_near)
         left, top = (
-            np.clip(low.ravel()[numbers] - 1, 0, most).astype(int) for low, most in zip(ends[::2], size, strict=True)
+            np.clip(low.ravel()[numbers] - 1 - start, 0, most).astype(int)
+            for low, start, most in zip(ends[::2], first, end - first, strict=True)
         )
         right, bottom = (
-            np.clip(high.ravel()[numbers] + 2, 0, most).astype(int) for high, most in zip(ends[1::2], size, strict=True)
+            np.clip(high.ravel()[numbers] + 2 - start, 0, most).astype(int)
+            for high, start, most in zip(ends[1::2], first, end - first, strict=True)
         )
         among = up_to[bottom, right] - up_to[top, right] - up_to[bottom, left] + up_to[top, left]
         numbers = numbers[among > 0]

@@ -76,6 +76,7 @@ class WarpMap:
         grid: of the submap.
         extent: (width, height) of the picture, the longer of them 1.
         version: counts the changes, for callers that cache what they made of the map.
+        leads: counts the changes of where it leads.
         factors: what it is made of, without the submap, for `ScaledMap`.
     """
 
@@ -101,7 +102,7 @@ class WarpMap:
         self._fresh: set[tuple[tuple[int, int], bool]] = set()  # of these, what holds the present map
         self._steps = 0  # since the last remap
         self._is_settled = True  # the submap began with what is held now
-        self.version = 0
+        self.version = self.leads = 0
 
     @property
     def grid(self) -> Grid:
@@ -219,7 +220,9 @@ class WarpMap:
         self._submap.release()
         self._submap = Submap(self.device, grid)
         self._steps = 0
+        leads = self.leads
         self._changed()
+        self.leads = leads
 
     def hold(self, frozen: Field | None, changed: Region | None = None) -> None:
         """From now on, change nothing where a mask over the whole picture, of any size, is 1.
@@ -647,4 +650,5 @@ class WarpMap:
 
     def _changed(self) -> None:
         self.version += 1
+        self.leads += 1
         self._fresh.clear()
