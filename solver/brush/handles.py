@@ -380,8 +380,9 @@ class Handles:
 
         "outside": nothing of it lies in the picture. "waiting": it has not begun. "over": its end has come. "edge": its
         goal is farther than it goes beside the picture's edge. "strain": the map around it slows it down so far
-        that it would let go by that alone. It has let go: "at odds" where others are held, "soft" where it leads with
-        less than all its stiffness, else "alone". "under way": its goal is. "late": that rests, and it comes nearer.
+        that it would let go by that alone. It has let go: "at odds" where another in force lies within both reaches,
+        "soft" where it leads with less than all its stiffness, else "alone". "under way": its goal is. "late": that
+        rests, and it comes nearer.
         """
         found = list[str | None]()
         if not self._shapes:
@@ -393,6 +394,8 @@ class Handles:
                 strain = self._strain.around(places[rows], self._radii[rows], self._expected.field, coarsely)
                 slower[rows] = self._slower(strain, np.flatnonzero(rows))
         near, time, lefts = 1 / max(self._warp.size), self._fluid.time, self.left(math.inf, 1.0)
+        held = np.repeat([handle.end >= time for handle in self.handles], self._counts)
+        held &= np.isfinite(self._starts[:, 0])
         for shape, rows, (_, waited), (_, left) in zip(self._shapes, self._rows, self._progress, lefts, strict=True):
             starts = self._starts[rows]
             if not shape.is_in_picture:
@@ -405,9 +408,14 @@ class Handles:
                 found.append("edge")
             else:
                 is_strained = slower[rows].min() * RATE * PATIENCE < math.log(2)  # (H1): no half in that time
-                let_go = "at odds" if len(self.handles) > 1 else "soft" if shape.handle.stiffness < 1 else "alone"
-                on_way = "under way" if time < shape.handle.last else "late" if left > near else None
-                found.append("strain" if is_strained else let_go if waited > PATIENCE else on_way)
+                if is_strained:
+                    found.append("strain")
+                elif waited <= PATIENCE:
+                    found.append("under way" if time < shape.handle.last else "late" if left > near else None)
+                elif _are_near(places, self._radii, rows, held):
+                    found.append("at odds")
+                else:
+                    found.append("soft" if shape.handle.stiffness < 1 else "alone")
         return found
 
     def left(self, time: float, dt: float) -> list[tuple[np.ndarray, float]]:
@@ -709,6 +717,14 @@ def _beside(places: np.ndarray, radii: np.ndarray, handles: np.ndarray, led: np.
     far = np.hypot(x[:, None] - x, y[:, None] - y) / (radii[:, None] + radii)
     near = np.maximum(1 - far**2, 0.0) ** 3 * (handles[:, None] != handles) * (led[:, None] & led)
     return 1 - (1 - near).prod(axis=1)
+
+
+def _are_near(places: np.ndarray, radii: np.ndarray, rows: slice, held: np.ndarray) -> bool:
+    """True if of what is held others lie within reach of what is in these rows, as `_beside`."""
+    others = held.copy()
+    others[rows] = False
+    x, y = np.moveaxis(places[rows][:, None] - places[others], -1, 0)
+    return bool((np.hypot(x, y) < radii[rows][:, None] + radii[others]).any())
 
 
 def _matrix(influence: np.ndarray) -> np.ndarray:

@@ -449,11 +449,31 @@ def test_of_what_is_missed_one_remedy_is_told(
 ):
     """`objections` tell of what goes too far that it wants a larger radius; no fit is offered beside that."""
     one = led_to([0.3, 0.5], [0.3 + far * radius, 0.5], radius=radius, local=local)
-    replay = replay_of(device, handle=[one], duration=3.0)
+    replay = replay_of(device, handle=[one], pin=[{"at": [0.9, 0.9], "radius": 0.01}], duration=3.0)  # far off
     replay.seek(180)
     ((_, said, is_helped),) = unmet(replay, ARRIVED)
     assert (said.partition("should be: ")[2], is_helped) == (why, helped)
     assert bool([*objections(replay.recipe.handle, (), EXTENT)]) == why.startswith("its reach")
+    replay.release()
+
+
+@pytest.mark.parametrize(
+    ("pin", "halt"),
+    [
+        ({"at": [0.31, 0.5]}, "at odds"),
+        ({"at": [0.31, 0.5], "end": 2.0}, "alone"),
+        ({"at": [0.31, 0.5], "start": 4.0}, "alone"),
+        ({"at": [0.31, 0.65]}, "alone"),
+    ],
+    ids=["near", "over", "waiting", "far"],
+)
+def test_only_what_is_near_is_in_the_way_of_what_has_let_go(device: Device, pin: dict[str, Any], halt: str):
+    """A pin somewhere else was told as the reason, as soon as there was one."""
+    one = led_to([0.3, 0.5], [0.324, 0.5], radius=0.03)
+    replay = replay_of(device, handle=[one], pin=[{"radius": 0.03} | pin], fluid={"grid": 32}, duration=3.0)
+    replay.seek(180)
+    halts = dict(zip([label for label, _ in replay.led], replay.handles.halts, strict=True))
+    assert halts["handle[1]"] == halt
     replay.release()
 
 
