@@ -183,7 +183,7 @@ class Robot:
         while not condition():
             assert time.monotonic() < deadline, [message.text for message in self.editor.messages.shown]
             self.frame()
-            time.sleep(0.05)  # for those that are waited for
+            time.sleep(min(self.editor.wait(), 0.05))  # for those that are waited for, if the editor itself has no work
         self.frame()
 
     def warp(self) -> np.ndarray:
