@@ -106,8 +106,11 @@ class SavedTiles:
         return [tile for tile in self.tiles.flat if not tile.is_blank]
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """The tiles that are not blank, off the GPU: their `places` (n,), counted by rows, and all `texels` of them."""
-        places, texels = list[int](), list[np.ndarray]()
+        """The tiles that are not blank, off the GPU: their `places` (n,), counted by rows, and all `texels` of them.
+
+        Those drawn into that hold what a blank one holds are only counted up, in `bare` (n,), if there are any.
+        """
+        places, texels, bare = list[int](), list[np.ndarray](), list[int]()
         dtype = np.dtype(DTYPES[self.kind.dtype])
         blank = round(self.blank * np.iinfo(dtype).max) if dtype.kind == "u" else self.blank
         bits = np.array([blank], dtype).view(f"u{dtype.itemsize}")
@@ -117,7 +120,10 @@ class SavedTiles:
                 if (values.view(bits.dtype) != bits).any():
                     places.append(place)
                     texels.append(values)
-        return {"places": np.array(places, np.int32), "texels": np.concatenate([np.zeros(0, dtype), *texels])}
+                else:
+                    bare.append(place)
+        arrays = {"places": np.array(places, np.int32), "texels": np.concatenate([np.zeros(0, dtype), *texels])}
+        return arrays | ({"bare": np.array(bare, np.int32)} if bare else {})
 
     def with_arrays(self, device: Device, arrays: Mapping[str, np.ndarray]) -> SavedTiles:
         """A new one of the same kind, holding what `arrays()` gave.
@@ -127,10 +133,14 @@ class SavedTiles:
         """
         kind, regions = self.kind, self.kind.regions
         places, texels = arrays.get("places"), arrays.get("texels")
+        bare = arrays.get("bare", np.zeros(0, np.int32))
         if places is None or texels is None or texels.dtype != DTYPES[kind.dtype]:
             raise ValueError("tiles are missing, or of another kind")
-        if places.ndim != 1 or ((places < 0) | (places >= len(regions))).any() or (np.diff(places) <= 0).any():
-            raise ValueError("tiles lie outside the field")
+        for some in (places, bare):
+            if some.ndim != 1 or ((some < 0) | (some >= len(regions))).any() or (np.diff(some) <= 0).any():
+                raise ValueError("tiles lie outside the field")
+        if np.isin(bare, places).any():
+            raise ValueError("tiles are there twice")
         shapes = [(regions[place][3], regions[place][2], kind.components) for place in places]
         ends = np.cumsum([np.prod(shape) for shape in shapes], dtype=int)
         if texels.shape != (ends[-1] if len(ends) else 0,):
@@ -138,6 +148,11 @@ class SavedTiles:
         tiles = np.full(self.tiles.shape, Tile())
         for place, shape, values in zip(places, shapes, np.split(texels, ends[:-1]), strict=False):
             tiles.flat[place] = Tile(values.nbytes, device.upload(values.reshape(shape), "saved tile", kind.dtype))
+        for place in bare:
+            width, height = regions[place][2:]
+            field = Field(device, (width, height), kind.components, "saved tile", kind.dtype, cleared=False)
+            field.clear(*[self.blank] * 4)
+            tiles.flat[place] = Tile(width * height * kind.components * np.dtype(DTYPES[kind.dtype]).itemsize, field)
         return _held(SavedTiles(kind, tiles, self.blank))
 
     def held(self) -> SavedTiles:

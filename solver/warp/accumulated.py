@@ -249,12 +249,16 @@ class AccumulatedMap:
     @property
     def _kept(self) -> tuple[Region, int] | None:
         """The texels of it that are kept once it is closed, and how many along a side become one; None: no room."""
+        if self._has_room((0, 0, *self.size), self._times):
+            return (0, 0, *self.size), self._times
+        box = self._box
+        return (box, 1) if self._has_room(box, 1) else None
+
+    def _has_room(self, region: Region, times: int) -> bool:
+        """True if a region of it can be closed, `times` of its texels along a side becoming one."""
         taken = sum(closed.field.nbytes for closed in self.closed)
-        for (x, y, width, height), times in (((0, 0, *self.size), self._times), (self._box, 1)):
-            texels = -(-width // times) * -(-height // times)
-            if taken + 4 * texels * sum(field.components for field, _, _ in self._pairs) <= MOST_CLOSED_BYTES:
-                return (x, y, width, height), times
-        return None
+        texels = -(-region[2] // times) * -(-region[3] // times)
+        return taken + 4 * texels * sum(field.components for field, _, _ in self._pairs) <= MOST_CLOSED_BYTES
 
     @property
     def _box(self) -> Region:

@@ -147,7 +147,26 @@ def test_arrays_bring_it_back_to_the_bit(dtype: str, device: Device) -> None:
         thing.release()
 
 
-@pytest.mark.parametrize("damage", ["places", "texels", "missing"])
+@pytest.mark.parametrize("dtype", ["f1", "f4"])
+def test_arrays_tell_what_was_drawn_into_where_it_is_blank_again(dtype: str, device: Device) -> None:
+    field, other = (TiledField(device, SIZE, 1, "tiled", dtype, SIDE, blank=1.0) for _ in range(2))
+    white = device.upload(np.full((SIZE[1], SIZE[0], 1), 1 if dtype == "f4" else 255, field.get().dtype))
+    field.copy_from(white, (40, 10, 5, 5))
+    field.copy_from(white, (90, 65, 10, 5))
+    saved, blank = State.of(device, {"mask": field}), State.of(device, {"mask": other})
+    arrays = saved.arrays()
+    assert arrays["mask/places"].size == arrays["mask/texels"].size == 0  # nothing that would make a file larger
+    given = blank.with_arrays(device, arrays)
+    given.write_to({"mask": other})
+    assert other.tiles == field.tiles == [(32, 0, 32, 32), (64, 64, 32, 6), (96, 64, 4, 6)]
+    assert other.get().tobytes() == field.get().tobytes()
+    again = State.of(device, {"mask": other})
+    assert {name: a.tolist() for name, a in again.arrays().items()} == {name: a.tolist() for name, a in arrays.items()}
+    for thing in (saved, blank, given, again, white, field, other):
+        thing.release()
+
+
+@pytest.mark.parametrize("damage", ["places", "texels", "missing", "twice", "bare"])
 def test_arrays_of_something_else_are_refused(damage: str, device: Device, tiled: TiledField) -> None:
     tiled.set(noise(1))
     saved = State.of(device, {"map": tiled})
@@ -156,6 +175,10 @@ def test_arrays_of_something_else_are_refused(damage: str, device: Device, tiled
         del arrays["map/texels"]
     elif damage == "places":
         arrays["map/places"] = arrays["map/places"] + 1
+    elif damage == "twice":
+        arrays["map/bare"] = arrays["map/places"][2:3]
+    elif damage == "bare":
+        arrays["map/bare"] = np.array([-1], np.int32)
     else:
         arrays["map/texels"] = arrays["map/texels"][:-1]
     with pytest.raises(ValueError, match="tiles"):

@@ -1064,6 +1064,29 @@ def test_closed_maps_without_room_for_the_picture_are_boxes_of_it(
         made.release()
 
 
+def test_a_map_resumed_from_bytes_closes_the_same_box(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where tiles that had moved hold nothing any more."""
+    monkeypatch.setattr("solver.warp.accumulated.MOST_CLOSED_BYTES", 1024 * 1024 * 8 - 1)
+    warp, then = (WarpMap(device, Grid(48, 48), (1024, 1024)) for _ in range(2))
+    for centre in ((0.1, 0.1), (0.57, 0.57)):
+        warp.advance_prescribed(swirl(centre, 0.1), 0.04)
+        warp.remap()
+        warp.restore_under((0.1, 0.1), 0.3, hardness=0.9, amount=1.0)
+    state, template = warp.save(), then.save()
+    assert "accumulated map/bare" in state.arrays()
+    resumed = template.with_arrays(device, state.arrays())
+    then.restore(resumed)
+    closed_states = []
+    for one in (warp, then):
+        one.close()
+        closed_states.append(one.save())
+    first, second = (saved.values["closed regions"] for saved in closed_states)
+    assert first.tolist() == second.tolist() == [[0, 0, 774, 774]]
+    np.testing.assert_array_equal(then.read(), warp.read())
+    for made in (state, template, resumed, *closed_states, warp, then):
+        made.release()
+
+
 def test_closed_maps_are_held_and_restored_as_one(device: Device) -> None:
     """What is frozen keeps every bit while more are closed; the restore brush gets through them to the identity."""
     warp, flow = wound_up(device, 5.0), swirl((0.5, 0.5), 0.45)
