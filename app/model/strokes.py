@@ -59,6 +59,7 @@ class BrushPath(Model):
         symmetry: it acts again on the other sides of the picture's middle: "left-right" and "up-down" mirror it, "both"
             does both, "radial" turns it about the middle.
         sectors: how many times a radial one acts in all.
+        hold: of a push: 0 slips by what it has carried and stretched already, 1 carries as far as it goes.
         local: of a push: 0 pushes as a fluid does, which flows back beside the brush; 1 moves what is under it alone.
     """
 
@@ -70,6 +71,7 @@ class BrushPath(Model):
     detail: Annotated[int, Field(ge=0, le=FINEST_DETAIL)] = 0
     symmetry: Symmetry = "none"
     sectors: Annotated[int, Field(ge=2, le=16)] = 6
+    hold: Fraction01 = 0.0
     local: Fraction01 = 0.0
     samples: Annotated[Several[Sample], Field(min_length=1)]
 
@@ -231,7 +233,7 @@ class BrushPath(Model):
         return last if last in following else last + 1
 
     def _head(self) -> tuple[object, ...]:
-        brush = self.tool, self.radius, self.hardness, self.strength, self.reverse, self.detail, self.local
+        brush = self.tool, self.radius, self.hardness, self.strength, self.reverse, self.detail, self.hold, self.local
         return *brush, self.symmetry, self.sectors
 
 

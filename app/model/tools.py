@@ -39,6 +39,7 @@ class BrushSettings:
     radius: float = 0.15
     hardness: float = 0.0
     strength: float = 1.0
+    hold: float = 0.0
     local: float = 0.0
     stiffness: float = 1.0
 
@@ -168,6 +169,7 @@ def _stroke(press: Press, name: ToolName, reverse: bool, *touches: Touch) -> Str
         detail=press.detail if name in FLOWING and press.symmetry == "none" else 0,
         symmetry=press.symmetry,
         sectors=press.sectors if press.symmetry == "radial" else 6,
+        hold=brush.hold if name == "push" else 0.0,
         local=brush.local if name == "push" else 0.0,
         samples=tuple((touch.tick, touch.x, touch.y, touch.pressure) for touch in touches),
     )
@@ -338,7 +340,7 @@ def _held(press: Press, tick: int, **what: Any) -> RecipeHandle:
 
 TOOLS = (
     Tool("push", "Push", "p", "Drag to push the picture along", painting("push"), ("Along", "Against"),
-         settings=("radius", "hardness", "strength", "local")),
+         settings=("radius", "hardness", "strength", "hold", "local")),
     Tool("curve", "Curve", "c", "Draw a path: the picture flows along it", _curve, ("Forwards", "Backwards")),
     Tool("twirl", "Twirl", "t", "Hold to turn the picture", painting("twirl"), ("Clockwise", "Anticlockwise")),
     Tool("bloat", "Bloat", "b", "Hold to let the picture swell", painting("bloat", "pinch"), ("Bloat", "Pinch")),

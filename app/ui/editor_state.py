@@ -26,8 +26,8 @@ SELECT_BY = {
 """By what is selected, and how."""
 SMALLEST, LARGEST = 0.005, 0.5  # of a brush's radius, in longer sides
 LIMITS = {
-    "radius": (SMALLEST, LARGEST), "hardness": (0.0, 1.0), "strength": (0.05, 1.0), "local": (0.0, 1.0),
-    "stiffness": (0.01, 1.0),
+    "radius": (SMALLEST, LARGEST), "hardness": (0.0, 1.0), "strength": (0.05, 1.0), "hold": (0.0, 1.0),
+    "local": (0.0, 1.0), "stiffness": (0.01, 1.0),
 }  # fmt: skip
 """From where to where a brush can be set."""
 

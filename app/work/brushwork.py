@@ -75,8 +75,8 @@ class Brushwork:
             case "push":
                 far = stroke.travelled(tick, scene.extent) / stroke.radius
                 on = coasting(whole, dt, scene.settings.drag, scene.settings.viscosity)
-                slip = min(slip_factor(far, on), quick_slip(whole))
-                self._lead(scene, Push(whole, dt, pressed, slip, strain_limit(far, on), stroke.local))
+                slip = min(slip_factor(far, on, stroke.hold), quick_slip(whole))
+                self._lead(scene, Push(whole, dt, pressed, slip, strain_limit(far, on), stroke.hold, stroke.local))
             case "curve":
                 for tip, amount in tips:
                     length = hypot(tip.end[0] - tip.start[0], tip.end[1] - tip.start[1])

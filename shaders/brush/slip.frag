@@ -15,6 +15,7 @@
 uniform sampler2D u_around;
 uniform vec2 u_velocities[MOST_IMAGES];
 uniform vec2 u_carried;
+uniform float u_hold;
 uniform vec2 u_strain;
 uniform vec2 u_places[MOST_IMAGES];
 uniform vec2 u_extent;
@@ -70,5 +71,5 @@ void main() {
     vec2 velocity = u_velocities[image()];
     float speed = length(velocity);
     vec2 direction = velocity / max(speed, 1e-9);
-    out_slip = speed == 0.0 ? 1.0 : by_path(displacement(ivec2(0)), direction) * by_strain(direction);
+    out_slip = speed == 0.0 ? 1.0 : mix(by_path(displacement(ivec2(0)), direction) * by_strain(direction), 1.0, u_hold);
 }

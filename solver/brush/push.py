@@ -14,7 +14,8 @@ from solver.grid import Grid
 from solver.limits import check_finite, check_step, check_type
 from solver.warp.map import WarpMap
 
-# A push slips so that what it draws out does not become thinner than the map can resolve, where the map would fold.
+# A push slips so that what it draws out does not become thinner than the map can resolve, where the map would fold. How
+# much it shall hold all the same is set (`Push.hold`): of each factor s of the first three laws it makes h + (1 - h) s.
 #
 # 1. By the brush's own path: it holds fast for FIRM radii, and in the end gives LOOSEST of its speed; one over a square
 #    in between. Else a long stroke would draw out what lay at its start into a thread.
@@ -68,10 +69,10 @@ def coasting(tip: Tip, dt: float, drag: float, viscosity: float) -> float:
     return speed / max(slowing, 1 / LONGEST_COASTING) / tip.radius
 
 
-def slip_factor(travelled: float, coasting: float = 0.0) -> float:
+def slip_factor(travelled: float, coasting: float = 0.0, hold: float = 0.0) -> float:
     """The part of its speed that a push gives, `travelled` radii after its stroke began: the first law."""
     by_path = LOOSEST + (1 - LOOSEST) / (1 + 2 * max(travelled - FIRM, 0.0) ** 2)
-    return by_path * FARTHEST_COASTING / max(coasting, FARTHEST_COASTING)
+    return (hold + (1 - hold) * by_path) * FARTHEST_COASTING / max(coasting, FARTHEST_COASTING)
 
 
 def quick_slip(tip: Tip) -> float:
@@ -105,6 +106,7 @@ class Push:
     Attributes:
         slip: the part of its own speed that the tip gives to the fluid; see `slip_factor`.
         strain_limit: the part of the most strain at which it slips; see `strain_limit`.
+        hold: from 0, where it slips by all that it has carried and stretched, to 1, where it does not for that.
         local: the part of its motion, 0-1, that carries what is under the tip and nothing else: the fluid does not feel
             it, and nothing flows back beside the brush; see `Brush.carry`.
 
@@ -117,6 +119,7 @@ class Push:
     strength: float = 1.0
     slip: float = 1.0
     strain_limit: float = 1.0
+    hold: float = 0.0
     local: float = 0.0
 
     def __post_init__(self) -> None:
@@ -125,9 +128,10 @@ class Push:
             raise ValueError("a push takes some time")
         for name in ("strength", "slip", "strain_limit"):
             check_finite(f"a push's {name}", getattr(self, name))
-        check_type("the local part of a push", self.local)
-        if not 0 <= self.local <= 1:
-            raise ValueError("the local part of a push must be from 0 to 1")
+        for what, part in (("how firmly a push holds", self.hold), ("the local part of a push", self.local)):
+            check_type(what, part)
+            if not 0 <= part <= 1:
+                raise ValueError(f"{what} must be from 0 to 1")
         for velocity in self.velocities:
             for speed in velocity:
                 check_finite("a push's speed", speed)
@@ -212,6 +216,7 @@ class Slip:
             velocities=for_images(push.velocities),
             radius=push.tip.radius,
             carried=(FIRM_CARRIED, LOOSEST_CARRIED),
+            hold=push.hold,
             strain=(push.strain_limit * SLIPPING, push.strain_limit * HELD_OFF),
             places=for_images(places),
             extent=warp.extent,

@@ -251,7 +251,8 @@ def _brush(rng: Rng, brush: Brush, fluid: Fluid, warp: WarpMap, dt: float) -> No
     tip = Tip(a, b, radius, rng.uniform(-1, 2), near=bool(rng.random() < 0.3))
     match rng.integers(4):
         case 0:
-            push = Push(tip, dt, rng.normal() * float(decades(rng, 1e-6, 1e6)), local=float(rng.random()))
+            strength, local = rng.normal() * float(decades(rng, 1e-6, 1e6)), float(rng.random())
+            push = Push(tip, dt, strength, hold=float(rng.random()), local=local)
             brush.lead(fluid, push, float(decades(rng, 1e-3, 1e6)), warp)
             brush.carry(fluid, push, warp)
         case 1:

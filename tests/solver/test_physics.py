@@ -281,6 +281,21 @@ def test_a_push_slips_by_the_path_that_the_picture_has_come_with_it(device: Devi
     warp.release()
 
 
+@pytest.mark.parametrize("hold", [0.0, 0.25, 1.0])
+def test_a_push_that_holds_slips_by_so_much_less(device: Device, hold: float) -> None:
+    """By each law: by its own path, and by how far it has carried and stretched what lies under it."""
+    assert slip_factor(2.0, 0.0, hold) == pytest.approx(hold + (1 - hold) * slip_factor(2.0))
+    assert slip_factor(2.0, 6.0, hold) == pytest.approx(slip_factor(2.0, 0.0, hold) / 4), "it coasts no farther"
+    warp, slip = WarpMap(device, Grid(48, 48)), Slip(device)
+    x = np.broadcast_to((np.arange(96) + 0.5) / 96 - 0.5, (96, 96))
+    for displacement, slipping in ((np.full((96, 96), -0.1), 5 / 6), (9 * x, 0.0)):
+        warp.set(np.stack([displacement, np.zeros((96, 96))], axis=-1))
+        slip.find(Push(Tip((0.5, 0.5), (0.51, 0.5), 0.1), 1 / 60, hold=hold), warp)
+        assert slip.factor.get()[slip.row, 0] == pytest.approx(hold + (1 - hold) * slipping, abs=0.01)
+    slip.release()
+    warp.release()
+
+
 @pytest.mark.parametrize(("across", "down", "factor"), [(9, 9, 1.0), (9, 0, 0.0), (0, 0, 1.0)])
 def test_a_push_lets_go_of_what_it_would_stretch_further(
     device: Device, across: float, down: float, factor: float

@@ -495,6 +495,7 @@ def test_what_is_of_no_use_is_told_in_a_sentence(device: Device, kind: type[Flui
         lambda wrong: Brush(device).lead(fluid, wrong),
         lambda wrong: Brush(device).make_up(fluid, Push(Tip((0.3, 0.3), (0.3, 0.3), 0.1), 0.1), wrong),
         lambda wrong: Push(Tip((0.3, 0.3), (0.3, 0.3), 0.1), 0.1, local=wrong),
+        lambda wrong: Push(Tip((0.3, 0.3), (0.3, 0.3), 0.1), 0.1, hold=wrong),
         lambda wrong: Tip((0.3, 0.3), (0.3, 0.3), wrong),
         lambda wrong: Tip((0.3, 0.3), (0.3, 0.3), 0.1, others=(wrong,)),
         lambda wrong: Handle(wrong),

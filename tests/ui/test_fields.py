@@ -52,6 +52,7 @@ def changed(before: dict[str, Any], after: dict[str, Any]) -> dict[str, Any]:
         ("Size", "60 px", {"radius": 60 / 480}),
         ("Hardness", "35 %", {"hardness": 0.35}),
         ("Strength", "40 %", {"strength": 0.4}),
+        ("Hold", "70 %", {"hold": 0.7}),
         ("Local", "25 %", {"local": 0.25}),
     ],
 )

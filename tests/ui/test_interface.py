@@ -819,7 +819,7 @@ def test_what_the_lanes_say_ends_in_dots_where_it_has_no_room(small: Robot, monk
     assert is_cut or said == {whole}
 
 
-BRUSH = {"radius", "hardness", "strength", "local"}  # of a push
+BRUSH = {"radius", "hardness", "strength", "hold", "local"}  # of a push
 
 
 def test_everything_about_the_brush_can_be_set_in_a_small_window(small: Robot) -> None:

@@ -70,6 +70,31 @@ def test_a_curve_blows_at_half_a_side_a_second(device: Device) -> None:
         assert replay.fluid.velocity_at_centres()[24, 28:36, 0] == pytest.approx(0.5, rel=0.02)
 
 
+@pytest.mark.parametrize(("viscosity", "drag"), [(0.3, 0.0), (0.0065, 0.0)])
+def test_a_push_that_holds_carries_the_picture_as_far_as_it_goes_and_folds_nothing(
+    viscosity: float, drag: float, device: Device
+) -> None:
+    """Six radii; one that does not hold leaves behind by and by what it has taken along, and half of it is between."""
+    radius, end, carried = 0.05, 0.8, list[float]()
+    for hold in (0.0, 0.5, 1.0):
+        samples = tuple((tick, 0.5 + (end - 0.5) * tick / 36, 0.5, 1.0) for tick in range(37))
+        push = {"tool": "push", "hold": hold, "radius": radius, "samples": samples}
+        fluid = {"grid": 96, "dt": 1 / 30, "viscosity": viscosity, "drag": drag}
+        recipe = Recipe.model_validate({"fluid": fluid, "stroke": (push,)})
+        replay = Replay(device, recipe, Pictures(Picture(np.zeros((400, 600, 3), np.uint8))))
+        try:
+            replay.seek(38)
+            ahead = np.stack([end + np.linspace(-1, 1, 81) * radius, np.full(81, 1 / 3)], axis=-1)
+            carried.append(float(-replay.warp.at(ahead)[:, 0].min()) / radius)
+            assert replay.warp.statistics().folds == 0
+        finally:
+            replay.release()
+    smeared, half, whole = carried
+    assert smeared < 1
+    assert smeared < 0.75 * half < 0.5 * whole
+    assert whole == pytest.approx(6, rel=0.05)
+
+
 def test_a_push_of_a_radius_a_tick_folds_nothing(device: Device) -> None:
     """Along such a way the velocity changes so much that one step of the midpoint rule would press the map to lines."""
     push = {"tool": "push", "radius": 0.045, "samples": ((0, 0.78, 0.107, 1.0), (12, 0.883, 0.762, 1.0))}
