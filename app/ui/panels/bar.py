@@ -51,6 +51,7 @@ SETTINGS = (
             "At 0 % the picture flows back beside the brush, as a fluid does. At 100 % only what is under it moves."),
 )  # fmt: skip
 DEFAULTS = BrushSettings()
+WIDE, NARROW = 148, 112  # points, of a slider where all have room, and where they have not
 BRUSHES_WIDTH = 236  # points, of what the button for more about the brush opens
 RIGHT = 4 * 32 + 3 * 4 + 17 + 96 + 8  # points, of what is at the right end of the bar
 
@@ -103,8 +104,12 @@ def _title(ui: Ui, tool: Tool, room: float) -> None:
 
 def _brush(ui: Ui, layout: Layout, workspace: Workspace, state: EditorState, likes: Preferences, room: float) -> None:
     """What can be set about the brush, up to `room`; for the rest, and for presets, there is a button."""
-    across = 148 if imgui.get_window_width() > ui.px(1080) else 112
     settings = [setting for setting in SETTINGS if setting.name in state.tool.settings]
+    button = ui.px(8 + 32)
+    start = imgui.get_item_rect_max().x - imgui.get_window_pos().x + ui.px(16) + button
+    if state.tool.directions:
+        start += ui.segmented_width(state.tool.directions) + ui.px(16)
+    across = WIDE if start + len(settings) * ui.px(WIDE + 8) <= room else NARROW
     parts: list[tuple[float, Callable[[float], None]]] = [
         (ui.px(across), lambda width, setting=setting: _slider(ui, workspace, state, setting, width))
         for setting in settings
@@ -112,7 +117,7 @@ def _brush(ui: Ui, layout: Layout, workspace: Workspace, state: EditorState, lik
     if state.tool.directions:
         width = ui.segmented_width(state.tool.directions)
         parts.insert(0, (width, lambda width: _directions(ui, state, width)))
-    button, gap = ui.px(8 + 32), ui.px(16)
+    gap = ui.px(16)
     while parts:
         imgui.same_line(0, gap)
         width, draw = parts[0]
