@@ -21,7 +21,7 @@ def play(name: str, *touches: Touch, opposite: bool = False, last: tuple[float, 
     """What a tool makes of touches and a release."""
     tool = TOOL[name]
     assert tool.gesture is not None
-    gesture = tool.gesture(Press(BrushSettings(0.1, 0.2, 0.8, local=0.3), opposite, EXTENT, DT, last), touches[0])
+    gesture = tool.gesture(Press(BrushSettings(0.1, 0.2, 0.8, hold=0.6, local=0.3), opposite, EXTENT, DT, last), touches[0])
     next(gesture)
     for touch in touches[1:]:
         gesture.send(touch)
@@ -38,7 +38,7 @@ def test_every_sample_is_kept() -> None:
     assert stroke is not None
     assert stroke.samples == tuple(touch[:4] for touch in touches)
     assert (stroke.tool, stroke.radius, stroke.hardness, stroke.strength) == ("push", 0.1, 0.2, 0.8)
-    assert stroke.local == 0.3
+    assert (stroke.hold, stroke.local) == (0.6, 0.3)
 
 
 @pytest.mark.parametrize(
@@ -49,7 +49,7 @@ def test_the_opposite_of_a_tool(tool: str, forward: str, backward: str) -> None:
     for opposite, wanted in ((False, forward), (True, backward)):
         stroke = play(tool, Touch(0, 0.5, 0.5), opposite=opposite)
         assert stroke is not None
-        assert (stroke.tool, stroke.reverse, stroke.local) == (wanted, False, 0)
+        assert (stroke.tool, stroke.reverse, stroke.hold, stroke.local) == (wanted, False, 0, 0)
     assert TOOL[tool].directions == (forward.capitalize(), backward.capitalize())
 
 
