@@ -21,7 +21,9 @@ def play(name: str, *touches: Touch, opposite: bool = False, last: tuple[float, 
     """What a tool makes of touches and a release."""
     tool = TOOL[name]
     assert tool.gesture is not None
-    gesture = tool.gesture(Press(BrushSettings(0.1, 0.2, 0.8, hold=0.6, local=0.3), opposite, EXTENT, DT, last), touches[0])
+    gesture = tool.gesture(
+        Press(BrushSettings(0.1, 0.2, 0.8, hold=0.6, local=0.3), opposite, EXTENT, DT, last), touches[0]
+    )
     next(gesture)
     for touch in touches[1:]:
         gesture.send(touch)

@@ -222,11 +222,20 @@ class Work(RuleBasedStateMachine):
     # -- what is done ------------------------------------------------------------------------------------------------
 
     @rule(tool=st.sampled_from(FLOWING), ends=WAYS, ticks=TICKS, back=st.booleans(), shift=st.booleans(),
-          symmetry=st.sampled_from(("none", "none", "both", "radial")), local=PARTS, how=ENDS)  # fmt: skip
+          symmetry=st.sampled_from(("none", "none", "both", "radial")), hold=PARTS, local=PARTS, how=ENDS)  # fmt: skip
     def paint(
-        self, tool: str, ends: Way, ticks: int, back: bool, shift: bool, symmetry: Any, local: float, how: str
+        self,
+        tool: str,
+        ends: Way,
+        ticks: int,
+        back: bool,
+        shift: bool,
+        symmetry: Any,
+        hold: float,
+        local: float,
+        how: str,
     ) -> None:
-        brush = BrushSettings(0.3, 0.5, local=local)
+        brush = BrushSettings(0.3, 0.5, hold=hold, local=local)
         press = Press(brush, back, self.work.extent, self.work.dt, symmetry=symmetry, sectors=5)
         self._draw(tool, press, ends, ticks, shift, how, TOOL[tool].label, "Pinch")
 

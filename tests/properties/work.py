@@ -32,7 +32,7 @@ SAMPLES = st.lists(
 ).map(lambda samples: [list(sample) for sample in sorted(samples, key=lambda sample: sample[0])])
 PATHS = st.fixed_dictionaries(
     {"tool": st.sampled_from((*PAINTING, "pinch", "thin", "thaw", "none")), "samples": SAMPLES},
-    optional={"radius": ANY, "hardness": ANY, "strength": ANY, "local": ANY, "reverse": st.booleans(),
+    optional={"radius": ANY, "hardness": ANY, "strength": ANY, "hold": ANY, "local": ANY, "reverse": st.booleans(),
               "symmetry": st.sampled_from(("none", "both", "radial")), "sectors": st.integers(-1, 20),
               "detail": st.sampled_from((0, 64, 128, -1))},
 )  # fmt: skip
