@@ -1017,6 +1017,25 @@ def test_closed_maps_of_a_large_map_have_as_many_texels_as_there_is_room_for(
         made.release()
 
 
+@pytest.mark.parametrize("centre", [(0.15, 0.15), (0.85, 0.15), (0.15, 0.85), (0.85, 0.85)])
+def test_a_map_is_closed_with_fewer_texels_wherever_it_has_moved(
+    device: Device, monkeypatch: pytest.MonkeyPatch, centre: tuple[float, float]
+) -> None:
+    """Of nine tiles the flow has reached one, in a corner."""
+    monkeypatch.setattr("solver.warp.accumulated.MOST_CLOSED_BYTES", 768 * 768 * 8)
+    warp = WarpMap(device, Grid(48, 48), (768, 768))
+    for _ in range(10):
+        warp.advance_prescribed(swirl(centre, 0.14), 0.05)
+    before = warp.read(warp.size)
+    assert np.abs(before).max() > 0.5 / 48
+    warp.close()
+    state = warp.save()
+    assert state.values["closed sizes"].tolist() == [[384, 384]]
+    assert difference(warp.read(warp.size), before) < 0.1 / 48
+    state.release()
+    warp.release()
+
+
 @pytest.mark.parametrize("undo", [False, True])
 def test_closed_maps_without_room_for_the_picture_are_boxes_of_it(
     undo: bool, device: Device, monkeypatch: pytest.MonkeyPatch
