@@ -334,7 +334,7 @@ def test_looking_changes_nothing(device: Device) -> None:
 def test_a_remap_of_two_grids_is_as_exact_as_the_finer_of_them_needs(
     device: Device, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The map has four texels for a cell of the whole picture, and fewer for one of the window: there it is read by six."""
+    """The map has four texels for a cell of the picture, and fewer for one of the window: there it is read by six."""
     monkeypatch.setattr("solver.warp.remapping.FEW_TILES", -1)  # or the first is taken in before the second is given
     whole = Grid(48, 48)
     part, flow = window(whole.refined(3), 48, 48, 48, 48), swirl((0.5, 0.5), 0.14)
