@@ -18,6 +18,7 @@ import pytest
 from PIL import Image
 
 from app import cli, doctor
+from app.gallery import figures, retouching
 from app.media.displacement import Displacement
 from app.media.maps import read_map, write_map
 from app.media.pictures import read_picture, write_picture
@@ -112,6 +113,17 @@ def test_a_sequence_with_numbers_ends_as_the_picture(folder: Path, fluidwarp: Ru
     assert numbers[-1]["divergence_left"] < 1e-2
     assert numbers[-1]["folds"] == 0
     assert {"advect", "diffuse", "project", "warp map"} <= numbers[-1]["milliseconds"].keys()
+
+
+def test_the_gallery_draws_the_figures_or_what_is_painted_and_tells_what_was_measured(
+    folder: Path, fluidwarp: Run, monkeypatch: pytest.MonkeyPatch
+):
+    for module, name in ((figures, "figures"), (retouching, "retouching")):
+        made = {name: {"folds": 0, "sharpness": 0.5}}
+        monkeypatch.setattr(module, "make", lambda device, output, progress, made=made: made)
+    for words, name in (((), "figures"), (("--strokes",), "retouching")):
+        ran = fluidwarp(folder, "gallery", "-o", "x", *words)
+        assert (ran.returncode, ran.stdout) == (0, f"{name}: folds 0, sharpness 0.5\n")
 
 
 def test_options_instead_of_the_recipe(folder: Path, fluidwarp: Run):

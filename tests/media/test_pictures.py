@@ -24,6 +24,7 @@ from PIL.PngImagePlugin import PngInfo
 
 from app.errors import UserError
 from app.media import files
+from app.media.codecs import jpeg
 from app.media.codecs.cmyk import cmyk_to_rgb
 from app.media.codecs.exr import read_channels
 from app.media.codecs.metadata import upright_dpi
@@ -1248,6 +1249,15 @@ def test_jpeg_is_not_asked_for_a_part_of_a_dot_per_inch(tmp_path: Path) -> None:
         else:
             with pytest.raises(UserError, match=r"JPEG holds whole dots per inch, not 72\.5"):
                 outputs.check()
+
+
+def test_a_jpeg_counts_dots_by_the_inch_or_the_centimetre_whichever_is_nearer_where_it_is_less_near() -> None:
+    dice = np.random.default_rng(0)
+    for dpi in dice.uniform(20, 400, (200, 2)).tolist():
+        ways = [[unit * round(value / unit) for value in dpi] for unit in (1.0, 2.54)]
+        least = min(max(abs(a - b) for a, b in zip(way, dpi, strict=True)) for way in ways)
+        held = jpeg.held_dpi((dpi[0], dpi[1]))
+        assert max(abs(a - b) for a, b in zip(held, dpi, strict=True)) == pytest.approx(least, abs=1e-5)
 
 
 @pytest.mark.parametrize(

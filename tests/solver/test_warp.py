@@ -331,6 +331,25 @@ def test_looking_changes_nothing(device: Device) -> None:
     np.testing.assert_array_equal(*found)
 
 
+def test_a_remap_of_two_grids_is_as_exact_as_the_finer_of_them_needs(
+    device: Device, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The map has four texels for a cell of the picture, and fewer for one of the window: there it is read by six."""
+    monkeypatch.setattr("solver.warp.remapping.FEW_TILES", -1)  # or the first is taken in before the second is given
+    whole = Grid(48, 48)
+    part, flow = window(whole.refined(3), 48, 48, 48, 48), swirl((0.5, 0.5), 0.14)
+    warp = WarpMap(device, whole, (192, 192))
+    warp.set(np.random.default_rng(0).normal(0, 0.001, (192, 192, 2)).astype(np.float32))
+    for grid in (part, whole):
+        warp.move_to(grid)
+        warp.advance_prescribed(flow, 0.03)
+    warp.move_to(part)
+    before = warp.read(warp.size)
+    warp.remap()
+    assert difference(warp.read(warp.size), before) < 1e-4
+    warp.release()
+
+
 def test_a_remap_touches_only_what_has_moved(device: Device) -> None:
     """In a window, and saves share the rest; what is moved and what is not meet without a seam."""
     whole = Grid(96, 96)
@@ -1015,6 +1034,25 @@ def test_closed_maps_of_a_large_map_have_as_many_texels_as_there_is_room_for(
             template.with_arrays(device, state.arrays() | {"closed sizes": sizes})
     for made in (state, beside, template, resumed, warp, then, frozen):
         made.release()
+
+
+@pytest.mark.parametrize("centre", [(0.15, 0.15), (0.85, 0.15), (0.15, 0.85), (0.85, 0.85)])
+def test_a_map_is_closed_with_fewer_texels_wherever_it_has_moved(
+    device: Device, monkeypatch: pytest.MonkeyPatch, centre: tuple[float, float]
+) -> None:
+    """Of nine tiles the flow has reached one, in a corner."""
+    monkeypatch.setattr("solver.warp.accumulated.MOST_CLOSED_BYTES", 768 * 768 * 8)
+    warp = WarpMap(device, Grid(48, 48), (768, 768))
+    for _ in range(10):
+        warp.advance_prescribed(swirl(centre, 0.14), 0.05)
+    before = warp.read(warp.size)
+    assert np.abs(before).max() > 0.5 / 48
+    warp.close()
+    state = warp.save()
+    assert state.values["closed sizes"].tolist() == [[384, 384]]
+    assert difference(warp.read(warp.size), before) < 0.1 / 48
+    state.release()
+    warp.release()
 
 
 @pytest.mark.parametrize("undo", [False, True])

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from math import cos, sin
 from pathlib import Path
+from unittest.mock import Mock
 
 import moderngl
 import pytest
 
+from app.errors import UserError
 from app.ui.rehearsal import PARTS, TICKS
+from app.work.replay import Replay
 from solver.gl import passes
 from solver.gl.device import Device
+from solver.gl.field import GraphicsMemoryError
 from solver.gl.program import compile_program
 from solver.warp.state import closed_in
 from support.editing import Robot, small_project
@@ -47,6 +51,23 @@ def test_a_press_interrupts_it_before_the_next_pass(robot: Robot) -> None:
     assert robot.device.watch is None
     rehearsal.has_news = nothing
     robot.until(lambda: not rehearsal.is_wanted)
+
+
+@pytest.mark.parametrize("error", [GraphicsMemoryError("no memory"), UserError("no memory")])
+def test_where_there_is_no_room_for_it_it_is_given_up_and_nobody_is_told(
+    robot: Robot, monkeypatch: pytest.MonkeyPatch, error: Exception
+) -> None:
+    rehearsal, session = robot.editor.rehearsal, robot.editor.session
+    rehearsal.has_news = nothing
+    with monkeypatch.context() as small:
+        small.setattr(Replay, "advance", Mock(side_effect=error))
+        robot.frame()
+    assert not rehearsal.is_wanted
+    assert rehearsal.trial is None
+    robot.drag((0.3, 0.5), (0.5, 0.5))
+    robot.rest()
+    assert session.replay.steps > 0
+    assert not robot.editor.messages.shown
 
 
 def test_a_stroke_that_is_drawn_before_it_waits_and_is_in_the_history_at_once(robot: Robot) -> None:
