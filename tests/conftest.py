@@ -18,7 +18,7 @@ import threading
 import warnings
 from collections.abc import Iterator
 from contextlib import suppress
-from functools import cache
+from functools import cache, wraps
 from pathlib import Path
 from typing import Any
 
@@ -99,8 +99,9 @@ def no_message_is_written_as_python_writes_values() -> Iterator[None]:
     """A list in a message is words one after the other, without Python's brackets and quotes."""
     make, told = UserError.__init__, set[str]()
 
-    def noting(self: UserError, message: str, *more: Any, **named: Any) -> None:
-        make(self, message, *more, **named)
+    @wraps(make)
+    def noting(self: UserError, *given: Any, **named: Any) -> None:
+        make(self, *given, **named)
         if AS_PYTHON.search(str(self)):
             told.add(str(self))
 
