@@ -338,7 +338,8 @@ def test_times_are_kept_to_a_billionth_of_a_second_wherever_they_are_moved(
     later = one
     for ticks in (1, 7, 100, 1000):
         later, before = moved(later, ticks, DT), later
-        assert later.span and before.span
+        assert later.span
+        assert before.span
         assert abs(later.span[0] - before.span[0] - ticks * DT) < 0.6e-9
     for ticks in (1000, 100, 7, 1):
         later = moved(later, -ticks, DT)
