@@ -757,6 +757,31 @@ def test_what_is_frozen_while_the_map_is_made_anew_is_taken_in_once(device: Devi
         warp.advance_prescribed(lambda x, y, t: (0 * x, 0 * y), 0.04)
 
 
+@pytest.mark.parametrize("then", ["nothing", "elsewhere"])
+def test_what_has_moved_since_what_moved_under_a_mask_alone_is_taken_in_when_that_changes(
+    device: Device, monkeypatch: pytest.MonkeyPatch, then: str
+) -> None:
+    """A submap waits whose motion counts nowhere, as all of it is frozen; the next one takes its place at once."""
+    monkeypatch.setattr("solver.warp.remapping.FEW_TILES", -1)  # or it does not wait
+    grid, x, y = Grid(48, 48), *Grid(384, 384).centres()
+    warp, alone = (WarpMap(device, grid, (384, 384), remap_every=4) for _ in range(2))
+    masks = [device.upload((np.hypot(x - at, y - 0.3) < 0.2).astype(np.uint8) * 255) for at in (0.3, 0.7)]
+    warp.hold(masks[0])
+    for _ in range(4):
+        warp.advance_prescribed(swirl((0.3, 0.3), 0.12), 0.04)
+    for number, flow in enumerate((swirl((0.7, 0.7), 0.2), swirl((0.8, 0.75), 0.2))):
+        for _ in range(4 + 20 * number):
+            for each in (warp, alone):
+                each.advance_prescribed(flow, 0.04)
+        if not number:
+            warp.hold(masks[1] if then == "elsewhere" else None)
+        wanted = alone.read((384, 384))
+        assert np.abs(wanted).max() > grid.h
+        assert difference(warp.read((384, 384)), wanted) < 0.01 * grid.h
+    for each in (warp, alone):
+        each.release()
+
+
 def test_the_distortion_of_what_is_frozen_is_that_of_what_is_looked_up(device: Device) -> None:
     grid = Grid(64, 64)
     masks, fluid, warp = Masks(device, grid), Fluid(device, grid), WarpMap(device, grid)
