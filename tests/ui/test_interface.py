@@ -610,6 +610,18 @@ def test_the_head_of_a_dialog_stays_where_it_is(device: Device, tmp_path: Path, 
     robot.close()
 
 
+def test_all_that_a_frame_has_heard_is_taken_up_in_it_unless_a_button_has_to_wait(robot: Robot) -> None:
+    """A pointer moves a thousand times a second, and frames are fewer: what is drawn must not fall behind."""
+    places = [(100 + 4 * number, 300 + number % 7) for number in range(60)]
+    robot.frame(*(Move(x, y, 1.0, robot.mods) for x, y in places))
+    pointer = imgui.get_io().mouse_pos
+    assert (pointer.x, pointer.y) == places[-1]
+    dialog = naming_an_export(robot)
+    robot.frame(*(Text(letter) for letter in "a long name"))
+    robot.frame()
+    assert dialog.name == "pattern warpeda long name"
+
+
 @pytest.mark.parametrize("by_click", [False, True])
 @pytest.mark.parametrize(("keys", "made"), [("ctrl+e", "pattern warped.png"), ("ctrl+s", "typed.fluidwarp")])
 def test_what_goes_wrong_in_a_dialog_is_told_in_it(
