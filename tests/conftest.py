@@ -12,12 +12,13 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 
 import gc
+import re
 import subprocess
 import threading
 import warnings
 from collections.abc import Iterator
 from contextlib import suppress
-from functools import cache
+from functools import cache, wraps
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,7 @@ import typer.main
 
 import solver.gl.passes
 from app import cli
+from app.errors import UserError
 from app.work.recovery import LOCK
 from solver.gl.device import Device
 from support.commands import Run
@@ -35,6 +37,10 @@ from support.khronos import Programs
 
 COMMAND = cache(typer.main.get_command)
 """Typer reads all annotations anew for each command line, which is most of what a wrong one costs."""
+
+AS_PYTHON = re.compile(
+    r"""[(\[{](['"])[^'"]*\1, ?['"]|\((['"])[^'"]*\2,\)|<[\w.]+ (object|at) |[a-z]\w+_keys\(|Path\("""
+)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -86,6 +92,23 @@ def no_thread_holds_up_the_end() -> Iterator[None]:
     yield
     threading.Thread.__init__ = make
     assert held <= {"app.work.export_process.end"}
+
+
+@pytest.fixture(scope="session", autouse=True)
+def no_message_is_written_as_python_writes_values() -> Iterator[None]:
+    """A list in a message is words one after the other, without Python's brackets and quotes."""
+    make, told = UserError.__init__, set[str]()
+
+    @wraps(make)
+    def noting(self: UserError, *given: Any, **named: Any) -> None:
+        make(self, *given, **named)
+        if AS_PYTHON.search(str(self)):
+            told.add(str(self))
+
+    UserError.__init__ = noting
+    yield
+    UserError.__init__ = make
+    assert not told
 
 
 def _held_open(root: Path) -> set[str]:

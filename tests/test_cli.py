@@ -18,6 +18,7 @@ import pytest
 from PIL import Image
 
 from app import cli, doctor
+from app.gallery import figures, retouching
 from app.media.displacement import Displacement
 from app.media.maps import read_map, write_map
 from app.media.pictures import read_picture, write_picture
@@ -34,6 +35,7 @@ from support.commands import Run
 from support.permissions import as_a_user, needs_permissions
 
 ROOT = Path(__file__).parent.parent
+BRIEFLY = "--evaluations", "1"
 RECIPE = """
 picture = "cat.png"
 duration = 0.2
@@ -112,6 +114,49 @@ def test_a_sequence_with_numbers_ends_as_the_picture(folder: Path, fluidwarp: Ru
     assert numbers[-1]["divergence_left"] < 1e-2
     assert numbers[-1]["folds"] == 0
     assert {"advect", "diffuse", "project", "warp map"} <= numbers[-1]["milliseconds"].keys()
+
+
+def test_the_gallery_draws_the_figures_or_what_is_painted_and_tells_what_was_measured(
+    folder: Path, fluidwarp: Run, monkeypatch: pytest.MonkeyPatch
+):
+    for module, name in ((figures, "figures"), (retouching, "retouching")):
+        made = {name: {"folds": 0, "sharpness": 0.5}}
+        monkeypatch.setattr(module, "make", lambda device, output, progress, made=made: made)
+    for words, name in (((), "figures"), (("--strokes",), "retouching")):
+        ran = fluidwarp(folder, "gallery", "-o", "x", *words)
+        assert (ran.returncode, ran.stdout) == (0, f"{name}: folds 0, sharpness 0.5\n")
+
+
+def test_names_in_capitals_are_of_the_same_kind(folder: Path, fluidwarp: Run):
+    (folder / "A.TOML").write_text(RECIPE)
+    (folder / "P.CSV").write_text("20,20,23,21\n")
+    made = []
+    for as_told in (str.lower, str.upper):
+        p, *names = (as_told(name) for name in ("p.csv", "b.png", "m.npy", "m.flo", "c.tif", "q.csv", "f.toml"))
+        (folder / "p.csv").write_bytes((folder / "P.CSV").read_bytes())
+        b, m, flo, c, q, f = names
+        for words in (
+            ("render", as_told("a.toml"), "-o", b, "--map", m), ("convert", m, "-o", flo), ("apply", flo, b, "-o", c),
+            ("fit", as_told("a.toml"), "--pairs", p, "-o", f, "--arrived", q, *BRIEFLY),
+        ):  # fmt: skip
+            ran = fluidwarp(folder, *words)
+            assert ran.returncode == 0, ran.stderr
+        made.append([(folder / name).read_bytes() for name in names])
+        for name in names:
+            (folder / name).unlink()
+    assert made[0] == made[1]
+
+
+def test_a_picture_in_place_of_a_projects_own_is_what_is_read(folder: Path, fluidwarp: Run):
+    (folder / "p.csv").write_text("10,10,11,11\n")
+    save(from_recipe(folder / "a.toml"), folder / "w.fluidwarp")
+    write_picture(folder / "dog.png", Picture(np.zeros((30, 20, 3), np.uint8)))
+    for words in (("--image", "cat.png", "-o", "cat.png"), ("--image", "dog.png", "--map", "m.npy", "-o", "dog.png")):
+        ran = fluidwarp(folder, "render", "w.fluidwarp", *words)
+        assert (ran.returncode, f"{words[1]} would be replaced by its own result" in ran.stderr) == (1, True)
+    ran = fluidwarp(folder, "fit", "w.fluidwarp", "--image", "dog.png", "--pairs", "p.csv", "-o", "f.toml", *BRIEFLY)
+    assert ran.returncode == 0, ran.stderr
+    assert Recipe.parse((folder / "f.toml").read_text()).picture == "dog.png"
 
 
 def test_options_instead_of_the_recipe(folder: Path, fluidwarp: Run):

@@ -14,7 +14,7 @@ from app.media.maps import read_map, telling_of
 from app.media.pictures import read_picture
 from app.media.project import frame_numbers, named_in
 from app.model.picture import Picture
-from app.model.recipe import Recipe
+from app.model.recipe import UNNAMED, Recipe
 from app.model.sampling import SOURCE
 
 
@@ -29,7 +29,7 @@ class Pictures:
     """
 
     def __init__(
-        self, source: Picture, folder: str | Path = ".", clip: Clip | None = None, label: str = "the recipe"
+        self, source: Picture, folder: str | Path = ".", clip: Clip | None = None, label: str = UNNAMED
     ) -> None:
         self.source = source
         self.clip = clip

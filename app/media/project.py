@@ -20,7 +20,7 @@ from app.media.leftovers import temporary_folder
 from app.media.recipes import read_recipe
 from app.media.source import Source, open_source
 from app.model.picture import Picture
-from app.model.recipe import Recipe
+from app.model.recipe import UNNAMED, Recipe
 from app.model.sampling import SOURCE
 from app.model.schema import plain
 
@@ -58,7 +58,7 @@ class Project:
     keeper: tempfile.TemporaryDirectory[str] | None = field(default=None, repr=False)
     clip: Clip | None = field(default=None, repr=False)
     seen: tuple[int, ...] | None = field(default=None, repr=False)
-    label: str = "the recipe"
+    label: str = UNNAMED
 
     @property
     def is_overtaken(self) -> bool:

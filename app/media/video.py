@@ -228,10 +228,14 @@ def _delayed(late: float) -> str:
     return f"setpts=PTS-{late}/TB,"
 
 
+def _pixel_words(video: str) -> list[str]:
+    """What ffmpeg says of a stream's pixels, in brackets after their format: range, colours, fields."""
+    found = re.search(r"Video: [^,]*, ?(?:none, )?\w+\(([^)]*)", video)
+    return [word.strip() for word in found[1].split(",")] if found else []
+
+
 def _losses(told: str, video: str, fps: Fraction) -> list[str]:
     """What of a clip is not understood, or not carried over, by ffmpeg's words about its first video stream."""
-    found = re.search(r"Video: [^,]*, ?(?:none, )?\w+\(([^)]*)", video)
-    words = [word.strip() for word in found[1].split(",")] if found else []
     losses = []
     _, primaries, transfer = _named_colours(video)
     odd = [primaries] if primaries not in USUAL_PRIMARIES else []
@@ -240,7 +244,7 @@ def _losses(told: str, video: str, fps: Fraction) -> list[str]:
         named = " ".join(NAMES.get(name, name) for name in odd)
         kept = all(name in (*KEPT_PRIMARIES, *HIGH) for name in odd)
         losses.append(f"its colours are {named} and are {'mixed as if' if kept else 'treated as'} BT.709")
-    if any(word.startswith(("top", "bottom")) for word in words):
+    if any(word.startswith(("top", "bottom")) for word in _pixel_words(video)):
         losses.append("it is interlaced, and its fields are treated as whole frames")
     if min(abs(_shortest(video) - 1), abs(_shortest(video) - 2)) > 0.02:  # 2: of fields
         losses.append(f"its frames come at a rate that varies, and become {float(fps):g} a second")
@@ -294,9 +298,7 @@ def _shortest(video: str) -> float:
 
 def _named_colours(video: str) -> tuple[str, str, str]:
     """ffmpeg's names of a stream's matrix, primaries and transfer, one for all where they are alike; "" if untold."""
-    found = re.search(r"Video: [^,]*, ?(?:none, )?\w+\(([^)]*)", video)
-    words = [word.strip() for word in found[1].split(",")] if found else []
-    named = next((word for word in words if re.search(r"/|bt|smpte|arib|film|iec", word)), "")
+    named = next((word for word in _pixel_words(video) if re.search(r"/|bt|smpte|arib|film|iec", word)), "")
     parts = named.split("/")
     return (parts[0], parts[1], parts[2]) if len(parts) == 3 else (named, named, named)
 

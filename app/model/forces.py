@@ -14,7 +14,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
@@ -70,10 +70,6 @@ class _Force(Timed):
         if mine and theirs and mine[0] == theirs[0] and self.edited(during=theirs) == other:
             return _tick_before(min(mine[1], theirs[1]), dt)
         return min(self.starts(dt), other.starts(dt))
-
-    def edited(self, **keys: Any) -> Self:
-        """The force with other values of some keys, validated."""
-        return type(self).model_validate({name: getattr(self, name) for name in type(self).model_fields} | keys)
 
     def faces(self, grid: Grid, pictures: NamedPictures) -> np.ndarray | None:
         """Acceleration (ny, nx, 2) float32 on left and upper faces, the walls' own faces zero; None if it has none.

@@ -122,10 +122,6 @@ class _Led(Model):
         """Its times, with its way between others."""
         return {"start": _short(start), "end": None if end == inf else _short(end)}
 
-    def edited(self, **keys: Any) -> Self:
-        """The same with other values of some keys, validated."""
-        return type(self).model_validate({name: getattr(self, name) for name in type(self).model_fields} | keys)
-
     def is_in_force(self, tick: int, dt: float) -> bool:
         """True if it leads or holds in a tick, as `Handles.lead` has it."""
         return self.start <= tick * dt + dt / 2 < self.let_go

@@ -22,6 +22,7 @@ from app.model.strokes import Change, Stroke
 from app.model.validation import complaint
 
 VERSION = 5
+UNNAMED = "the recipe"  # what messages call one of which nothing else is known
 MOST_TICKS = 1_000_000
 MOST_WATCHED = 100  # points, sought after every tick
 FINEST_GRID = 4096  # cells along the longer side
@@ -240,7 +241,7 @@ class Recipe(Model):
     # -- text -------------------------------------------------------------------------------------------------------
 
     @classmethod
-    def parse(cls, text: str, source: str = "the recipe") -> Self:
+    def parse(cls, text: str, source: str = UNNAMED) -> Self:
         """The recipe written in `text`.
 
         Raises:
@@ -355,7 +356,7 @@ class Recipe(Model):
         """The recipe, simulated on another grid."""
         return self.edited(fluid=self.fluid.model_copy(update={"grid": cells}))
 
-    def checked(self, source: str = "the recipe") -> Self:
+    def checked(self, source: str = UNNAMED) -> Self:
         """The recipe, validated as a whole again: for parts that came from outside, that is from `source`.
 
         Raises:

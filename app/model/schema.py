@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin
+from typing import Annotated, Any, Literal, Self, TypeVar, get_args, get_origin
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from pydantic.fields import FieldInfo
@@ -12,6 +12,10 @@ class Model(BaseModel):
     """A frozen value that takes no unknown key, no number written as text, and no NaN or infinity."""
 
     model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
+
+    def edited(self, **keys: Any) -> Self:
+        """The same with other values of some keys, validated."""
+        return type(self).model_validate({name: getattr(self, name) for name in type(self).model_fields} | keys)
 
 
 Fraction01 = Annotated[float, Field(ge=0, le=1)]

@@ -17,7 +17,7 @@ from app.media.opening import Opened, check_picture
 from app.media.outlines import read_outlines
 from app.media.project import picture_names
 from app.model.picture import Picture
-from app.model.recipe import Recipe
+from app.model.recipe import UNNAMED, Recipe
 from app.progress import Progress
 from app.work.fitting import EVALUATIONS, Fitted, fitted
 from app.work.tasks import opened
@@ -35,7 +35,7 @@ class Fit:
     evaluations: int = EVALUATIONS
     local: float | None = None
     clip: Clip | None = None
-    source: str = "the recipe"
+    source: str = UNNAMED
 
     @property
     def label(self) -> str:

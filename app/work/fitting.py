@@ -30,7 +30,7 @@ from app.model.handles import (
     objections,
 )
 from app.model.picture import Picture
-from app.model.recipe import Recipe
+from app.model.recipe import UNNAMED, Recipe
 from app.model.sampling import Point
 from app.model.schema import label_of
 from app.model.windows import with_detail
@@ -137,7 +137,7 @@ def fitted(
     evaluations: int = EVALUATIONS,
     local: float | None = None,
     clip: Clip | None = None,
-    label: str = "the recipe",
+    label: str = UNNAMED,
 ) -> Fitted:
     """The recipe with a handle for each pair, its values searched for the least work that reaches them without a fold.
 

@@ -22,7 +22,7 @@ from app.media.maps import Kind, check_map
 from app.media.opening import check_picture
 from app.media.pictures import write_picture
 from app.model.picture import Picture
-from app.model.recipe import Recipe
+from app.model.recipe import UNNAMED, Recipe
 
 
 @dataclass(frozen=True)
@@ -175,7 +175,7 @@ class Job:
     outputs: Outputs
     clip: Clip | None = None
     frame: tuple[Clip, int] | None = None
-    named_by: str = "the recipe"
+    named_by: str = UNNAMED
 
     @property
     def target(self) -> Path:

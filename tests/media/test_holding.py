@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from app.media.animation import ANIMATIONS
+from app.media.depth import to_bits
 from app.media.formats import FORMATS
 from app.media.holding import Losses, Written
 from app.model.picture import Picture
@@ -46,3 +47,25 @@ def test_what_a_sentence_says_to_write_keeps_all_that_it_says_is_lost(kind: type
                     assert not found.lost & kept.lost, found.said
                     told += 1
     assert told > 50
+
+
+@pytest.mark.parametrize("is_light", [False, True])
+def test_only_what_is_multiplied_by_alpha_is_divided_by_it(is_light: bool) -> None:
+    """A PNG of 16 bits holds codes of 16 bits with any alpha, unless the colours are brighter than white."""
+    codes = np.random.default_rng(0).integers(1, 65536, (8, 8, 4)).astype(np.uint16)
+    pixels = to_bits(codes, 32) if is_light else codes
+    assert not losses("a.png", Picture(pixels)).lost
+    assert "above" in losses("a.png", Picture(pixels, premultiplied=True)).lost
+
+
+def test_a_name_in_capitals_holds_the_same() -> None:
+    values = np.random.default_rng(0).random((8, 8, 4), np.float32) * 2
+    picture = Picture(values, xmp=b"<x/>", dpi=(72.5, 72.5))
+    ways: list[tuple[str, dict[str, Any]]] = [(ending, {}) for ending in FORMATS]
+    ways += [(ending, {"animated": True}) for ending in ANIMATIONS]
+    told = 0
+    for ending, how in ways:
+        found, loud = losses(f"a{ending}", picture, **how), losses(f"a{ending.upper()}", picture, **how)
+        assert (loud.lost, loud.said.lower()) == (found.lost, found.said.lower())
+        told += bool(found.lost)
+    assert told > 10

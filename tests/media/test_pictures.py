@@ -24,6 +24,7 @@ from PIL.PngImagePlugin import PngInfo
 
 from app.errors import UserError
 from app.media import files
+from app.media.codecs import jpeg
 from app.media.codecs.cmyk import cmyk_to_rgb
 from app.media.codecs.exr import read_channels
 from app.media.codecs.metadata import upright_dpi
@@ -1240,6 +1241,39 @@ def test_a_folder_that_takes_no_new_files_is_not_told_as_gone() -> None:
         write_picture(Path("/proc/nope.png"), Picture(smooth(3)))
 
 
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_the_largest_of_an_icons_pictures_is_read_and_the_others_are_told(tmp_path: Path, count: int) -> None:
+    sides = [(16, 16), (48, 48), (32, 32)][-count:]
+    largest = Image.fromarray(np.random.default_rng(0).integers(0, 256, (48, 48, 3), np.uint8))
+    largest.resize(max(sides)).save(tmp_path / "a.ico", sizes=sides)
+    read = read_picture(tmp_path / "a.ico")
+    assert (read.width, read.height) == max(sides)
+    assert read.note == (f"a.ico: of its {count} pictures only the largest is used" if count > 1 else "")
+
+
+@pytest.mark.parametrize(("has_text", "has_extension"), [(False, False), (True, False), (False, True), (True, True)])
+def test_what_a_tga_says_before_and_after_its_pixels_is_told(
+    tmp_path: Path, has_text: bool, has_extension: bool
+) -> None:
+    path = tmp_path / "a.tga"
+    Image.fromarray(smooth(3)).save(path, id_section=b"a shot" if has_text else b"")
+    if has_extension:
+        end = struct.pack("<II18s", path.stat().st_size, 0, b"TRUEVISION-XFILE.\0")
+        path.write_bytes(path.read_bytes() + bytes(495) + end)
+    parts = ["its text is not kept"] * has_text + ["its extension is not kept"] * has_extension
+    assert read_picture(path).note == (f"a.tga: {'; '.join(parts)}" if parts else "")
+
+
+@pytest.mark.parametrize(("code", "note"), [(95, "a.dds: its floats become 8 bits a channel"), (98, "")])
+def test_floats_in_a_dds_are_told(tmp_path: Path, code: int, note: str) -> None:
+    """One block of 4 x 4 pixels, of DXGI's formats BC6H_UF16 and BC7_UNORM."""
+    head = struct.pack("<4s7I44x", b"DDS ", 124, 0x1007, 4, 4, 16, 0, 0)
+    pixels = struct.pack("<2I4s5I", 32, 4, b"DX10", 0, 0, 0, 0, 0) + struct.pack("<5I", 0x1000, 0, 0, 0, 0)
+    path = tmp_path / "a.dds"
+    path.write_bytes(head + pixels + struct.pack("<5I", code, 3, 0, 1, 0) + b"\x40" + bytes(15))
+    assert read_picture(path).note == note
+
+
 def test_jpeg_is_not_asked_for_a_part_of_a_dot_per_inch(tmp_path: Path) -> None:
     for dpi in (72.5, 71.12, 72.0):  # the second is 28 a centimetre
         outputs = Outputs(tmp_path / "a.jpg", dpi=dpi)
@@ -1248,6 +1282,15 @@ def test_jpeg_is_not_asked_for_a_part_of_a_dot_per_inch(tmp_path: Path) -> None:
         else:
             with pytest.raises(UserError, match=r"JPEG holds whole dots per inch, not 72\.5"):
                 outputs.check()
+
+
+def test_a_jpeg_counts_dots_by_the_inch_or_the_centimetre_whichever_is_nearer_where_it_is_less_near() -> None:
+    dice = np.random.default_rng(0)
+    for dpi in dice.uniform(20, 400, (200, 2)).tolist():
+        ways = [[unit * round(value / unit) for value in dpi] for unit in (1.0, 2.54)]
+        least = min(max(abs(a - b) for a, b in zip(way, dpi, strict=True)) for way in ways)
+        held = jpeg.held_dpi((dpi[0], dpi[1]))
+        assert max(abs(a - b) for a, b in zip(held, dpi, strict=True)) == pytest.approx(least, abs=1e-5)
 
 
 @pytest.mark.parametrize(

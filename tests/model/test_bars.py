@@ -323,6 +323,29 @@ def test_a_handle_that_is_moved_or_stretched_goes_its_way_then() -> None:
     assert stretched(handle(duration=0.0), 6, 60, DT) == handle(start=0.1, duration=0.0)
 
 
+@pytest.mark.parametrize(
+    "one",
+    [
+        force(at=(0.123456789, 0.987654321)), force(during=(0.123456789, 0.987654321)),
+        force(keys=((0.123456789, 0.0), (0.555555555, 1.0), (0.987654321, 0.0))),
+        handle(start=0.123456789, duration=0.5, end=0.987654321), RecipePin(at=(0.4, 0.5), start=0.123456789),
+    ],
+)  # fmt: skip
+def test_times_are_kept_to_a_billionth_of_a_second_wherever_they_are_moved(
+    one: Force | RecipeHandle | RecipePin,
+) -> None:
+    """So nothing is left of it when it is moved back."""
+    later = one
+    for ticks in (1, 7, 100, 1000):
+        later, before = moved(later, ticks, DT), later
+        assert later.span
+        assert before.span
+        assert abs(later.span[0] - before.span[0] - ticks * DT) < 0.6e-9
+    for ticks in (1000, 100, 7, 1):
+        later = moved(later, -ticks, DT)
+    assert later == one
+
+
 @pytest.mark.parametrize("pin", [RecipePin(at=(0.4, 0.5), start=0.5), handle(to=None, keys=(), start=0.5)])
 def test_what_only_stays_lets_go_once_its_end_is_dragged(pin: RecipePin | RecipeHandle) -> None:
     assert bars(Recipe.model_validate({pin.kind: (pin,)}))[0][1:4] == (30, math.inf, math.inf)

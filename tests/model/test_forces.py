@@ -398,3 +398,7 @@ def test_a_gradient_within_a_window_is_weighed_by_it() -> None:
     weight = Window.model_validate(frozen(window)).weight(grid)
     at_faces = (weight[:, 1:] + weight[:, :-1]) / 2
     np.testing.assert_allclose(within[:, 1:, 0], bare[:, 1:, 0] * at_faces, atol=1e-6)
+    upright = OnePicture(halves.transpose(1, 0, 2))
+    bare, within = (force(kind="gradient", blur=0.3, **keys).faces(grid, upright) for keys in ({}, {"within": window}))
+    at_faces = (weight[1:] + weight[:-1]) / 2
+    np.testing.assert_allclose(within[1:, :, 1], bare[1:, :, 1] * at_faces, atol=1e-6)

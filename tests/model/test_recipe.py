@@ -467,3 +467,12 @@ def test_no_recipe_takes_more_words_and_numbers_than_are_counted(path: Path, mon
 
 def test_nor_does_one_with_everything(monkeypatch: pytest.MonkeyPatch):
     check_written(Recipe.parse(FULL), monkeypatch)
+
+
+@pytest.mark.parametrize("dt", [1 / 60, 1 / 48, 0.01, 0.0333, 0.1])
+def test_a_duration_is_the_nearest_number_of_steps(dt: float):
+    for ticks in range(1, 400):
+        for part, wanted in ((0.0, ticks), (-0.45, ticks), (0.45, ticks)):
+            recipe = Recipe(duration=(ticks + part) * dt, fluid=FluidSettings(dt=dt))
+            assert recipe.ticks == wanted
+    assert Recipe(duration=0.1 * dt, fluid=FluidSettings(dt=dt)).ticks == 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -371,26 +372,37 @@ def test_any_strokes_in_windows_give_the_same_bytes_by_any_path(device: Device, 
         strokes.append(Stroke.model_validate(given | {"local": float(rng.random())}))
         first += int(rng.integers(1, 8))
     recipe = painted(*strokes, feel=HONEY, cells=24, ticks=first + 8)
+    check_paths(device, recipe, (size[0], size[1]), rng, lambda: {"stroke": recipe.stroke[: int(rng.integers(5))]})
+
+
+def check_paths(
+    device: Device, recipe: Recipe, size: tuple[int, int], rng: np.random.Generator, less: Callable[[], dict[str, Any]]
+) -> tuple[set[FlowWindow | None], int]:
+    """Played, sought, with `less` of it for a while or gone on from a moment, it is the same; its windows and folds."""
     pictures = Pictures(Picture(np.zeros((size[1], size[0], 3), np.uint8)))
     plain, other = (Replay(device, recipe, pictures, budget) for budget in (0, 2**28))
-    moments = {}
+    moments, windows = {}, set()
     for tick in range(recipe.ticks + 1):
         plain.seek(tick)
+        windows.add(plain.window)
         moments[tick] = plain.snapshot()
     assert np.isfinite(plain.warp.read()).all()
     for _ in range(4):
         tick = int(rng.integers(recipe.ticks + 1))
         other.seek(tick)
         same(other.snapshot(), moments[tick])
-        other.use(recipe.edited(stroke=recipe.stroke[: int(rng.integers(5))]))
+        assert len(other.handles.halts) == len(recipe.handle) + len(recipe.pin)  # looking changes nothing
+        other.use(recipe.edited(**less()))
         other.use(recipe)
         same(other.snapshot(), moments[tick])
         start = int(rng.integers(recipe.ticks))
         other.resume(start, moments[start])
         other.advance()
         same(other.snapshot(), moments[start + 1])
+    folds = plain.warp.statistics().folds
     for item in (plain, other):
         item.release()
+    return windows, folds
 
 
 EXTENT = 1.0, SIZE[1] / SIZE[0]
@@ -491,30 +503,13 @@ def test_handles_in_windows_give_the_same_bytes_by_any_path(device: Device, seed
     recipe = painted(*strokes, feel=[PUTTY, HONEY, WATER][seed % 3], cells=24, ticks=ticks)
     given = ([with_detail(one, recipe, tuple(extent.tolist())) for one in each] for each in (handles, pins))
     recipe = recipe.edited(**dict(zip(("handle", "pin"), map(tuple, given), strict=True)))
-    pictures = Pictures(Picture(np.zeros((size[1], size[0], 3), np.uint8)))
-    plain, other = (Replay(device, recipe, pictures, budget) for budget in (0, 2**28))
-    moments, windows = {}, set()
-    for tick in range(recipe.ticks + 1):
-        plain.seek(tick)
-        windows.add(plain.window)
-        moments[tick] = plain.snapshot()
+
+    def less() -> dict[str, Any]:
+        return {"handle": recipe.handle[:1], "stroke": recipe.stroke[: int(rng.integers(4))]}
+
+    windows, folds = check_paths(device, recipe, size, rng, less)
     assert windows != {None}
-    assert np.isfinite(plain.warp.read()).all()
-    assert plain.warp.statistics().folds == 0
-    for _ in range(4):
-        tick = int(rng.integers(recipe.ticks + 1))
-        other.seek(tick)
-        same(other.snapshot(), moments[tick])
-        assert len(other.handles.halts) == len(handles) + len(pins)  # looking changes nothing
-        other.use(recipe.edited(handle=recipe.handle[:1], stroke=recipe.stroke[: int(rng.integers(4))]))
-        other.use(recipe)
-        same(other.snapshot(), moments[tick])
-        start = int(rng.integers(recipe.ticks))
-        other.resume(start, moments[start])
-        other.advance()
-        same(other.snapshot(), moments[start + 1])
-    for item in (plain, other):
-        item.release()
+    assert folds == 0
 
 
 def same(found: dict[str, np.ndarray], wanted: dict[str, np.ndarray]) -> None:

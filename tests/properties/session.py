@@ -526,6 +526,7 @@ class Work(RuleBasedStateMachine):
         assert document.saved_recipe == self.saved
         assert document.is_dirty == (document.recipe != self.saved)
         assert 0 <= self.work.tick <= max(self.work.end, self.work.target)
+        assert 0 <= self.work.target <= self.work.end
         assert self.device.ctx.error == "GL_NO_ERROR"
 
     def teardown(self) -> None:

@@ -378,6 +378,50 @@ def test_a_twirl_that_moves_turns_about_where_it_is(device: Device) -> None:
     np.testing.assert_allclose(given[1], given[0], atol=1e-6)
 
 
+def test_what_is_read_of_a_flow_is_by_the_lengths_of_its_cells_which_are_not_squares(device: Device) -> None:
+    """u = a x + b y, v = c x + d y: divergence a + d; and vorticity c - b, where no wall is near."""
+    grid = Grid(24, 16, (1.0, 0.5))
+    assert grid.spacing[0] > 1.3 * grid.spacing[1]
+    a, b, c, d = 0.3, 0.7, -0.4, 0.2
+    fluid, (hx, hy) = Fluid(device, grid), grid.spacing
+    row, column = np.mgrid[0:16, 0:24]
+    u = a * column * hx + b * (row + 0.5) * hy
+    v = c * (column + 0.5) * hx + d * row * hy
+    fluid.velocity.read.set(np.stack([u, v], axis=-1).astype(np.float32))
+    inside = slice(1, -2), slice(1, -2)
+    np.testing.assert_allclose(fluid.divergence()[inside], a + d, atol=1e-4)
+    np.testing.assert_allclose(fluid.vorticity()[2:-2, 2:-2], c - b, atol=1e-4)
+    fluid.release()
+
+
+@pytest.mark.parametrize("how", ["cleared", "set to rest", "laid anew"])
+@pytest.mark.parametrize("viscosity", [0.0, 0.01])
+def test_a_fluid_that_is_stopped_goes_on_as_a_new_one(device: Device, how: str, viscosity: float) -> None:
+    """To the bit: nothing of the steps before is left, neither pressure nor first guesses nor a brush's impulse."""
+    grid, force = Grid(32, 24), np.random.default_rng(0).normal(0, 1, (24, 32, 2))
+    flows = []
+    for has_moved in (False, True):
+        fluid, brush = Fluid(device, grid), Brush(device)
+        fluid.set_viscosity(viscosity)
+        if has_moved:
+            for _ in range(4):
+                fluid.step(0.05, -2 * force)
+            brush.push(fluid, Tip((0.4, 0.4), (0.45, 0.4), radius=0.1), 0.05)
+            if how == "cleared":
+                fluid.clear_velocity()
+            elif how == "set to rest":
+                fluid.set_velocity(np.zeros((24, 32, 2)))
+            else:
+                fluid.lay_on(grid)
+        for _ in range(3):
+            fluid.step(0.05, force)
+        flows.append((fluid.u, fluid.v))
+        brush.release()
+        fluid.release()
+    np.testing.assert_array_equal(flows[0][0], flows[1][0])
+    np.testing.assert_array_equal(flows[0][1], flows[1][1])
+
+
 def test_expand_grows_by_its_integral(device: Device) -> None:
     grid = Grid(96, 64)
     fluid, brush = Fluid(device, grid), Brush(device)

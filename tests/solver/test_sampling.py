@@ -114,6 +114,24 @@ def test_tiles_are_the_same_to_the_bit(device: Device, edges: str) -> None:
         np.testing.assert_array_equal(np.concatenate(list(tiled.bands(warp, picture, size, how))), wanted)
 
 
+@pytest.mark.parametrize("edges", ["transparent", "black"])
+@pytest.mark.parametrize("samples", ["auto", 1, 2])
+@pytest.mark.parametrize("way", [(0, 1), (0, -1), (1, 1), (1, -1)], ids=str)
+def test_what_is_outside_by_less_than_a_map_can_tell_is_the_edge(
+    device: Device, edges: str, samples: int | str, way: tuple[int, int]
+) -> None:
+    """A hundredth of a pixel, of a map that is given; half a pixel less is where the middle of the last one is."""
+    axis, sign = way
+    displacement = np.zeros((48, 64, 2), np.float32)
+    picture = np.full((48, 64, 4), 0.5, np.float32)
+    for beyond, is_there in ((0.004, True), (0.02, False)):
+        displacement[..., axis] = sign * (0.5 + beyond) / 64
+        how = Sampling(edges=edges, samples=samples, premultiplied=True)  # type: ignore[arg-type]
+        found = Sampler(device).apply(GivenMap(device, displacement), picture, how=how).swapaxes(0, axis)
+        assert np.allclose(found[2:-2, -1 if sign > 0 else 0, :3], 0.5, atol=1e-3) == is_there
+        assert np.allclose(found[2:-2, 2:-2], 0.5, atol=1e-3)
+
+
 @pytest.mark.parametrize("samples", ["auto", 1, 4])
 def test_black_outside_is_opaque_as_far_as_it_takes_part(device: Device, samples: int | str) -> None:
     """A picture of one alpha: "transparent" edges tell which part of a pixel it covers, "black" ones fill the rest."""

@@ -14,6 +14,7 @@ from solver.params import NoSlip
 from solver.viscosity.clusters import ClusterMatrix
 from solver.viscosity.conjugate_gradients import cg_coefficients
 from solver.viscosity.multigrid import Multigrid
+from solver.viscosity.operator import Coefficients
 from solver.viscosity.plan import Plan
 
 
@@ -88,6 +89,23 @@ def test_coarse_operators_are_galerkin_products(device: Device, aspect: float) -
         wanted = (p.T @ fine @ p / 4.0)[open_coarse][:, open_coarse]
         assert abs(coarse[open_coarse][:, open_coarse] - wanted).max() < 1e-6 * abs(wanted).max()
         nx, ny = nx // 2, ny // 2
+    multigrid.release()
+
+
+@pytest.mark.parametrize("aspect", [1.0, 1.3, 0.4])
+@pytest.mark.parametrize("sides", [(False, False, False, False), (True, False, False, True), (True, True, True, True)])
+def test_one_viscosity_has_the_operator_of_a_mask_that_is_the_same_everywhere(
+    device: Device, aspect: float, sides: tuple[bool, bool, bool, bool]
+) -> None:
+    """On cells of any shape, between walls that glide or stick."""
+    no_slip, shape = NoSlip(*sides, False), (7, 10)
+    viscosity, solid = np.full(shape, 3.0, np.float32), np.zeros(shape, bool)
+    fields = device.upload(viscosity), device.upload(solid.astype(np.uint8))
+    multigrid = Multigrid(device, shape[::-1], (0.1, 0.1 * aspect))
+    multigrid.set_coefficients(*fields, viscosity, solid, 0.02, no_slip, Plan())
+    level, kappa = multigrid.finest, 3.0 * 0.02 / (0.1 * 0.1 * aspect)
+    uniform = Coefficients.uniform(kappa, shape[::-1], level.texels, level.shear, no_slip)
+    np.testing.assert_allclose(uniform.matrix(), level.coefficients().matrix(), atol=1e-5 * kappa)
     multigrid.release()
 
 

@@ -331,6 +331,25 @@ def test_looking_changes_nothing(device: Device) -> None:
     np.testing.assert_array_equal(*found)
 
 
+def test_a_remap_of_two_grids_is_as_exact_as_the_finer_of_them_needs(
+    device: Device, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The map has four texels for a cell of the picture, and fewer for one of the window: there it is read by six."""
+    monkeypatch.setattr("solver.warp.remapping.FEW_TILES", -1)  # or the first is taken in before the second is given
+    whole = Grid(48, 48)
+    part, flow = window(whole.refined(3), 48, 48, 48, 48), swirl((0.5, 0.5), 0.14)
+    warp = WarpMap(device, whole, (192, 192))
+    warp.set(np.random.default_rng(0).normal(0, 0.001, (192, 192, 2)).astype(np.float32))
+    for grid in (part, whole):
+        warp.move_to(grid)
+        warp.advance_prescribed(flow, 0.03)
+    warp.move_to(part)
+    before = warp.read(warp.size)
+    warp.remap()
+    assert difference(warp.read(warp.size), before) < 1e-4
+    warp.release()
+
+
 def test_a_remap_touches_only_what_has_moved(device: Device) -> None:
     """In a window, and saves share the rest; what is moved and what is not meet without a seam."""
     whole = Grid(96, 96)
@@ -738,6 +757,31 @@ def test_what_is_frozen_while_the_map_is_made_anew_is_taken_in_once(device: Devi
         warp.advance_prescribed(lambda x, y, t: (0 * x, 0 * y), 0.04)
 
 
+@pytest.mark.parametrize("then", ["nothing", "elsewhere"])
+def test_what_has_moved_since_what_moved_under_a_mask_alone_is_taken_in_when_that_changes(
+    device: Device, monkeypatch: pytest.MonkeyPatch, then: str
+) -> None:
+    """A submap waits whose motion counts nowhere, as all of it is frozen; the next one takes its place at once."""
+    monkeypatch.setattr("solver.warp.remapping.FEW_TILES", -1)  # or it does not wait
+    grid, x, y = Grid(48, 48), *Grid(384, 384).centres()
+    warp, alone = (WarpMap(device, grid, (384, 384), remap_every=4) for _ in range(2))
+    masks = [device.upload((np.hypot(x - at, y - 0.3) < 0.2).astype(np.uint8) * 255) for at in (0.3, 0.7)]
+    warp.hold(masks[0])
+    for _ in range(4):
+        warp.advance_prescribed(swirl((0.3, 0.3), 0.12), 0.04)
+    for number, flow in enumerate((swirl((0.7, 0.7), 0.2), swirl((0.8, 0.75), 0.2))):
+        for _ in range(4 + 20 * number):
+            for each in (warp, alone):
+                each.advance_prescribed(flow, 0.04)
+        if not number:
+            warp.hold(masks[1] if then == "elsewhere" else None)
+        wanted = alone.read((384, 384))
+        assert np.abs(wanted).max() > grid.h
+        assert difference(warp.read((384, 384)), wanted) < 0.01 * grid.h
+    for each in (warp, alone):
+        each.release()
+
+
 def test_the_distortion_of_what_is_frozen_is_that_of_what_is_looked_up(device: Device) -> None:
     grid = Grid(64, 64)
     masks, fluid, warp = Masks(device, grid), Fluid(device, grid), WarpMap(device, grid)
@@ -1015,6 +1059,25 @@ def test_closed_maps_of_a_large_map_have_as_many_texels_as_there_is_room_for(
             template.with_arrays(device, state.arrays() | {"closed sizes": sizes})
     for made in (state, beside, template, resumed, warp, then, frozen):
         made.release()
+
+
+@pytest.mark.parametrize("centre", [(0.15, 0.15), (0.85, 0.15), (0.15, 0.85), (0.85, 0.85)])
+def test_a_map_is_closed_with_fewer_texels_wherever_it_has_moved(
+    device: Device, monkeypatch: pytest.MonkeyPatch, centre: tuple[float, float]
+) -> None:
+    """Of nine tiles the flow has reached one, in a corner."""
+    monkeypatch.setattr("solver.warp.accumulated.MOST_CLOSED_BYTES", 768 * 768 * 8)
+    warp = WarpMap(device, Grid(48, 48), (768, 768))
+    for _ in range(10):
+        warp.advance_prescribed(swirl(centre, 0.14), 0.05)
+    before = warp.read(warp.size)
+    assert np.abs(before).max() > 0.5 / 48
+    warp.close()
+    state = warp.save()
+    assert state.values["closed sizes"].tolist() == [[384, 384]]
+    assert difference(warp.read(warp.size), before) < 0.1 / 48
+    state.release()
+    warp.release()
 
 
 @pytest.mark.parametrize("undo", [False, True])

@@ -73,7 +73,8 @@ class Drawn:
 
         def noting(*given: Any) -> Any:
             at, size = imgui.get_cursor_screen_pos(), imgui.get_font_size()
-            self.lines.append(f"{name} {_told(at)} {_told(size)} | {' | '.join(str(value) for value in given)}")
+            ink = _told(imgui.get_color_u32(imgui.Col_.text))
+            self.lines.append(f"{name} {_told(at)} {_told(size)} {ink} | {' | '.join(str(value) for value in given)}")
             return drawn(*given)
 
         monkeypatch.setattr(imgui, name, noting)

@@ -89,8 +89,8 @@ class Laid:
 
         monkeypatch.setattr(imgui, kind, noting)
 
-    def faults(self, frame: Callable[[], None]) -> list[str]:
-        """What is cut off, beyond reach, or over something else, in a frame that is drawn now."""
+    def faults(self, frame: Callable[[], None], canvas: Rect | None = None) -> list[str]:
+        """What is cut off, beyond reach, over something else or floats beyond the canvas, in a frame drawn now."""
         self._looks = True
         frame()
         self._looks = False
@@ -110,6 +110,10 @@ class Laid:
             for one, other in combinations(floating, 2)
             if _overlap(_whole(one), _whole(other))
         ]
+        if canvas is not None:
+            told += [
+                f"{one.name} sticks out of the canvas" for one in floating if _sticks_out(_whole(one), canvas, True)
+            ]
         return told
 
 

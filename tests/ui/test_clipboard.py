@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -150,6 +151,23 @@ def test_without_copykitten_a_sentence_says_how_to_get_it(robot: Robot, chord: s
     (message,) = robot.editor.messages.shown
     assert message.text == "Pictures on the clipboard need copykitten; install it with: pip install copykitten"
     assert not robot.editor.exports.is_running
+
+
+def test_a_copy_that_is_stopped_is_on_no_clipboard_and_leaves_nothing(
+    robot: Robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    board, folder, exports = Board(), tmp_path / "temporary", robot.editor.exports
+    folder.mkdir()
+    monkeypatch.setitem(sys.modules, "copykitten", board)
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    robot.key("ctrl+c")
+    robot.frame()
+    assert exports.is_running
+    assert list(folder.iterdir())
+    exports.cancel()
+    assert not exports.is_running
+    robot.until(lambda: not list(folder.iterdir()))
+    assert board.held is None
 
 
 def test_only_the_newest_pasted_pictures_are_kept(tmp_path: Path) -> None:

@@ -628,25 +628,6 @@ def test_a_picture_whose_name_is_no_text_is_opened_chosen_and_saved(robot: Robot
     assert projects.load(tmp_path / "w.fluidwarp").recipe.picture == "caf?.png"
 
 
-def test_the_name_has_the_keys_again_when_a_save_has_failed(robot: Robot, tmp_path: Path) -> None:
-    robot.key("ctrl+s")
-    robot.frame(count=2)
-    dialog = robot.editor.dialogs.shown[-1]
-    assert isinstance(dialog, SaveDialog)
-    dialog.folder = tmp_path / "nowhere"
-    robot.key("enter")
-    robot.frame(count=3)
-    assert robot.editor.dialogs.shown == [dialog]
-    dialog.folder = tmp_path
-    robot.type("typed")
-    robot.frame(count=2)
-    assert dialog.name == "typed"
-    robot.key("enter")
-    robot.frame(count=3)
-    assert not robot.editor.dialogs.shown
-    assert (tmp_path / "typed.fluidwarp").exists()
-
-
 def test_saving_where_it_cannot_be_says_so(robot: Robot, tmp_path: Path) -> None:
     robot.drag((0.3, 0.4), (0.45, 0.4))
     assert not robot.editor.files.save_as(tmp_path / "nowhere" / "work.fluidwarp")

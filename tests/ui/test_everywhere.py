@@ -245,6 +245,27 @@ def test_nothing_is_cut_off_or_over_something_else(
     assert not told, "\n".join(f"{state}: {fault}" for fault, state in told.items())
 
 
+def test_what_floats_lies_on_the_canvas_however_narrow_that_is(
+    device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also on a screen that is smaller than the smallest window."""
+    likes, told = Preferences(auto_quality=False, hint=True), list[str]()
+    laid, widths = Laid(monkeypatch), set[float]()
+    with Robot(device, small_project(tmp_path), SIZES[0], preferences=likes) as robot:
+        for tool in ("push", "freeze", "handle", "select"):
+            robot.editor.state.choose_tool(tool, False)
+            robot.editor.state.overlays["viscosity"].shown = tool == "push"
+            for width in range(500, 900, 12):
+                robot.size = width, 520
+                robot.frame(count=2)
+                canvas = robot.editor.layout.canvas
+                found = laid.faults(robot.frame, canvas)
+                told += [f"{tool}, {canvas.width}: {fault}" for fault in found if fault.endswith("the canvas")]
+                widths.add(canvas.width)
+    assert len(widths) > 20
+    assert not told
+
+
 DRAWN = ("add_", "push_clip_rect", "text_unformatted", "input_text", "combo")  # at places of the screen
 PLACES = {"add_circle": 2, "add_circle_filled": 2, "add_polyline": 6, "add_text": 2, "text_unformatted": 2}  # else 4
 ACROSS, DOWN, WIDE, THIN = 6.0, 2.0, 5.0, 0.3  # points that are no fault: of places, widths, and thicknesses

@@ -610,37 +610,52 @@ def test_the_head_of_a_dialog_stays_where_it_is(device: Device, tmp_path: Path, 
     robot.close()
 
 
-def test_what_goes_wrong_in_a_dialog_is_told_in_it(robot: Robot, tmp_path: Path) -> None:
-    robot.key("ctrl+e")
-    robot.frame(count=3)
-    export = robot.editor.dialogs.shown[-1]
-    assert isinstance(export, ExportDialog)
-    export.folder = tmp_path / "nowhere"
-    robot.frame(count=2)
-    before = export.rect.height
-    robot.key("enter")
-    robot.frame(count=3)
-    assert robot.editor.dialogs.shown == [export]
-    assert "nowhere" in export.problem
-    assert not robot.editor.messages.shown
-    assert export.rect.height > before
-    robot.key("escape")
-    robot.frame(count=2)
+def test_all_that_a_frame_has_heard_is_taken_up_in_it_unless_a_button_has_to_wait(robot: Robot) -> None:
+    """A pointer moves a thousand times a second, and frames are fewer: what is drawn must not fall behind."""
+    places = [(100 + 4 * number, 300 + number % 7) for number in range(60)]
+    robot.frame(*(Move(x, y, 1.0, robot.mods) for x, y in places))
+    pointer = imgui.get_io().mouse_pos
+    assert (pointer.x, pointer.y) == places[-1]
+    dialog = naming_an_export(robot)
+    robot.frame(*(Text(letter) for letter in "a long name"))
+    robot.frame()
+    assert dialog.name == "pattern warpeda long name"
 
-    robot.key("ctrl+s")
+
+@pytest.mark.parametrize("by_click", [False, True])
+@pytest.mark.parametrize(("keys", "made"), [("ctrl+e", "pattern warped.png"), ("ctrl+s", "typed.fluidwarp")])
+def test_what_goes_wrong_in_a_dialog_is_told_in_it(
+    keys: str, made: str, by_click: bool, robot: Robot, tmp_path: Path
+) -> None:
+    robot.key(keys)
     robot.frame(count=3)
-    save = robot.editor.dialogs.shown[-1]
-    assert isinstance(save, SaveDialog)
-    save.folder = tmp_path / "nowhere"
-    robot.key("enter")
-    robot.frame(count=3)
-    assert "nowhere" in save.problem
+    dialog = robot.editor.dialogs.shown[-1]
+    assert isinstance(dialog, ExportDialog | SaveDialog)
+
+    def go_on() -> None:
+        if by_click:
+            robot.click(dialog.rect.right - 60, dialog.rect.bottom - 36)
+        else:
+            robot.key("enter")
+        robot.frame(count=3)
+
+    dialog.folder = tmp_path / "nowhere"
+    robot.frame(count=2)
+    before = dialog.rect.height
+    go_on()
+    assert robot.editor.dialogs.shown == [dialog]
+    assert "nowhere" in dialog.problem
     assert not robot.editor.messages.shown
-    save.folder = tmp_path
-    robot.click(save.rect.right - 60, save.rect.bottom - 36)
-    robot.frame(count=3)
+    assert dialog.rect.height > before
+    dialog.folder = tmp_path
+    if isinstance(dialog, SaveDialog):  # its name has the keys again
+        robot.type("typed")
+        robot.frame(count=2)
+        assert dialog.name == "typed"
+    go_on()
     assert not robot.editor.dialogs.shown
-    assert (tmp_path / "pattern.fluidwarp").exists()
+    robot.until(lambda: not robot.editor.exports.is_running)
+    assert (tmp_path / made).exists()
 
 
 # What is remembered -------------------------------------------------------------------------------------------------

@@ -456,6 +456,12 @@ def test_while_a_stroke_is_painted_the_others_stay_in_their_lanes() -> None:
     assert all(one is other for one, other in zip(blocks[1][:-1], blocks[2][:-1], strict=True))
 
 
+def test_each_time_of_a_repeated_stroke_is_as_long_on_the_track_as_the_first() -> None:
+    stroke = Stroke(tool="push", samples=((30, 0.5, 0.5, 1.0), (49, 0.6, 0.5, 1.0)), repeat=3, every=40)
+    found = [(block.start, block.end) for block in Lanes().blocks(Recipe(stroke=(stroke,), duration=4.0), 0.5)]
+    assert found == [(30, 50), (70, 90), (110, 130)]
+
+
 @pytest.mark.parametrize("seed", range(2))
 def test_what_is_kept_of_lanes_and_blocks_is_what_would_be_made_anew(seed: int) -> None:
     """Whatever changes from one frame to the next: strokes, other bars, the length, the zoom, or several of these."""

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from math import cos, sin
 from pathlib import Path
+from unittest.mock import Mock
 
 import moderngl
 import pytest
 
+from app.errors import UserError
 from app.ui.rehearsal import PARTS, TICKS
+from app.work.replay import Replay
 from solver.gl import passes
 from solver.gl.device import Device
+from solver.gl.field import GraphicsMemoryError
 from solver.gl.program import compile_program
 from solver.warp.state import closed_in
 from support.editing import Robot, small_project
@@ -20,21 +24,10 @@ def nothing() -> bool:
     return False
 
 
-def test_it_ends_by_itself_and_leaves_the_work_as_it_is(robot: Robot) -> None:
-    rehearsal, session = robot.editor.rehearsal, robot.editor.session
+def test_presses_interrupt_it_and_then_each_part_does_what_it_is_for_and_leaves_the_work_as_it_is(robot: Robot) -> None:
+    rehearsal, session, asked, moved = robot.editor.rehearsal, robot.editor.session, list[int](), list[float]()
     assert not rehearsal.is_wanted  # without a window nobody presses anything
-    rehearsal.has_news = nothing
     steps, recipe = session.replay.steps, session.recipe
-    assert robot.editor.wants_frame()
-    robot.until(lambda: not rehearsal.is_wanted)
-    robot.frame(count=10)
-    assert not robot.editor.wants_frame()
-    assert (session.replay.steps, session.recipe, session.is_moving) == (steps, recipe, False)
-    assert robot.device.watch is None
-
-
-def test_a_press_interrupts_it_before_the_next_pass(robot: Robot) -> None:
-    rehearsal, asked = robot.editor.rehearsal, list[int]()
 
     def pressed() -> bool:
         asked.append(robot.device.timings.passes["other"])
@@ -45,8 +38,39 @@ def test_a_press_interrupts_it_before_the_next_pass(robot: Robot) -> None:
     assert len(asked) == 21
     assert rehearsal.is_wanted
     assert robot.device.watch is None
+
     rehearsal.has_news = nothing
-    robot.until(lambda: not rehearsal.is_wanted)
+    assert robot.editor.wants_frame()
+    while rehearsal.is_wanted:
+        robot.frame()
+        if rehearsal.trial is not None:
+            moved.append(float(abs(rehearsal.trial.warp.read()).max()))
+    # A part whose recipe is refused, or moves nothing, would be silent, and compile nothing.
+    seen = TICKS - 1  # of the last tick nothing is left to see
+    assert len(moved) == seen * len(PARTS)
+    assert min(moved[seen - 1 :: seen]) > 0.01
+
+    robot.frame(count=10)
+    assert not robot.editor.wants_frame()
+    assert (session.replay.steps, session.recipe, session.is_moving) == (steps, recipe, False)
+    assert robot.device.watch is None
+
+
+@pytest.mark.parametrize("error", [GraphicsMemoryError("no memory"), UserError("no memory")])
+def test_where_there_is_no_room_for_it_it_is_given_up_and_nobody_is_told(
+    robot: Robot, monkeypatch: pytest.MonkeyPatch, error: Exception
+) -> None:
+    rehearsal, session = robot.editor.rehearsal, robot.editor.session
+    rehearsal.has_news = nothing
+    with monkeypatch.context() as small:
+        small.setattr(Replay, "advance", Mock(side_effect=error))
+        robot.frame()
+    assert not rehearsal.is_wanted
+    assert rehearsal.trial is None
+    robot.drag((0.3, 0.5), (0.5, 0.5))
+    robot.rest()
+    assert session.replay.steps > 0
+    assert not robot.editor.messages.shown
 
 
 def test_a_stroke_that_is_drawn_before_it_waits_and_is_in_the_history_at_once(robot: Robot) -> None:
@@ -61,19 +85,6 @@ def test_a_stroke_that_is_drawn_before_it_waits_and_is_in_the_history_at_once(ro
     assert session.replay.steps > 0
     assert not rehearsal.is_needed
     assert rehearsal.is_wanted  # the rest of it, of which the stroke needs nothing
-
-
-def test_the_parts_do_what_they_are_for(robot: Robot) -> None:
-    """Else they compile nothing: a part whose recipe is refused, or moves nothing, would be silent."""
-    rehearsal, moved = robot.editor.rehearsal, list[float]()
-    rehearsal.has_news = nothing
-    while rehearsal.is_wanted:
-        robot.frame()
-        if rehearsal.trial is not None:
-            moved.append(float(abs(rehearsal.trial.warp.read()).max()))
-    seen = TICKS - 1  # of the last tick nothing is left to see
-    assert len(moved) == seen * len(PARTS)
-    assert min(moved[seen - 1 :: seen]) > 0.01
 
 
 def test_a_long_stir_compiles_nothing_that_is_felt(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -259,6 +259,25 @@ def test_the_order_in_which_warps_are_shown(time: str, order: list[float]):
     assert shown_positions(Timeline.of(recipe), recipe, 10) == (order, {})
 
 
+@pytest.mark.parametrize("time", ["", "reverse = true", "ping_pong = true", "dissolve = 0.2", "hold_last = 0.1"])
+def test_each_tick_is_simulated_once_whichever_way_an_animation_goes(
+    device: Device, picture: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, time: str
+) -> None:
+    """As often as it is promised, which is what the bar of progress shows."""
+    ticks, advance, progress = list[int](), Replay.advance, Progress()
+
+    def noting(replay: Replay) -> None:
+        advance(replay)
+        ticks.append(replay.tick)
+
+    monkeypatch.setattr(Replay, "advance", noting)
+    recipe = Recipe.parse(f"{WHIRL}\n[time]\n{time}\n")
+    job = Job(recipe, read_picture(picture), tmp_path, Outputs(tmp_path / "a.gif"))
+    run(device, job, progress)
+    assert ticks == sorted(set(ticks))
+    assert progress.done == progress.total
+
+
 def test_a_loop_is_dissolved_of_the_frames_that_there_are(device: Device, picture: Path, tmp_path: Path):
     """Also where a part of it is made alone."""
     head = "duration = 0.8\n[fluid]\ngrid = 16\ndt = 0.1\n[[force]]\nkind = 'point'\npoint = [0.5, 0.5]\n"

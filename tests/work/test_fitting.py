@@ -462,6 +462,22 @@ def test_what_is_fitted_from_is_not_written_over(tmp_path: Path):
             replace(job, arrived=path).check()
 
 
+def test_of_two_trials_the_one_that_does_not_fold_then_the_nearer_then_the_evener_then_the_shorter_is_better():
+    """Each where all before it are alike, and whatever those after it are. How near to a fold it is counts less than
+    how near the points are, unless there is one."""
+    none = np.zeros(0)
+
+    def rank(folds: int, det: float, off: float, work: float) -> tuple[float, ...]:
+        return Trial(Recipe(), none, none, np.array([off]), work, det, folds).rank
+
+    better = [
+        rank(0, 0.5, 0.0, 1.0), rank(0, 0.9, 0.0, 2.0), rank(0, 0.15, 0.0, 1.0), rank(0, 0.1, 0.0, 0.5),
+        rank(0, 0.05, 0.02, 1.0), rank(0, 0.5, 0.03, 0.5), rank(1, -0.1, 0.0, 0.5), rank(9, -0.3, 0.0, 0.1),
+    ]  # fmt: skip
+    assert better == sorted(better)
+    assert len(set(better)) == len(better)
+
+
 def test_a_fit_is_told_in_a_line():
     nothing, pairs = np.zeros(0), Pairs.points(PAIRS)
     trial = Trial(Recipe(), pairs.places, nothing, nothing, work=1.25, det=0.5, folds=3)

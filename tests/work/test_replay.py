@@ -178,6 +178,17 @@ def test_between_two_ticks_the_map_is_between_them(replay: Replay):
     assert np.abs(part - (maps[2] - maps[0]) / 3).max() < 0.02 * whole
 
 
+def test_the_cells_that_are_told_as_closed_are_those_that_are_wholly(device: Device):
+    """Of a soft and slanted path some are closed in part: the fluid goes through them."""
+    freeze = "[[freeze]]\nkind = 'path'\npoints = [[0.2, 0.3], [0.7, 0.8]]\nradius = 0.1\nhardness = 0.2\n"
+    recipe = Recipe.parse(f"[fluid]\ngrid = 32\n{freeze}")
+    replay = Replay(device, recipe, pictures())
+    parts = replay.fluid.solid.get() / 255
+    assert ((parts >= 0.5) & (parts < 1)).sum() > 10
+    np.testing.assert_array_equal(replay.solid, parts == 1)
+    replay.release()
+
+
 def test_changes_act_at_their_tick(device: Device):
     recipe = Recipe.parse(
         "[fluid]\ngrid = 32\n[[force]]\nkind = 'vortex'\npoint = [0.5, 0.5]\nstrength = 8\nat = [0, 0.11]\n"

@@ -99,6 +99,23 @@ def test_whatever_can_be_painted_can_be_opened_again(
     assert len(session.recipe.stroke) == len(kept.stroke) - 1
 
 
+def test_where_less_of_the_work_is_left_the_playhead_is_at_its_end(session: Session) -> None:
+    for x in (0.3, 0.6):
+        paint(session, "push", (x, 0.3), (x, 0.6), ticks=12)
+        session.pause()
+    whole, short = session.recipe, session.recipe.stroke[0].last_tick + 3
+    for tick in (0, short - 1, short, short + 1, session.end - 1, session.end):
+        session.seek(tick)
+        session.settle()
+        session.edit("Shorter", stroke=whole.stroke[:1], duration=short * session.dt)
+        assert session.end == short
+        assert session.target == (short if tick == whole.ticks else min(tick, short))
+        session.settle()
+        assert session.tick == session.target
+        session.edit("Longer", stroke=whole.stroke, duration=whole.duration)
+        session.settle()
+
+
 def test_an_edit_that_would_be_refused_when_it_is_opened_again_is_not_made(
     session: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
