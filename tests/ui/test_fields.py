@@ -78,7 +78,7 @@ def test_a_slider_follows_to_where_it_is_let_go_of_however_few_frames_there_are(
     while robot.editor.backend.is_behind:
         assert robot.editor.wait() == 0
         robot.frame()
-    assert robot.editor.state.brush.hardness == pytest.approx(0.77, abs=0.01)
+    assert robot.editor.state.brush.hardness == pytest.approx(0.75 + 3 / place.width, abs=0.01)
 
 
 @pytest.mark.parametrize(("label", "name"), [("Viscosity", "viscosity"), ("Drag", "drag")])
@@ -702,6 +702,7 @@ held rotate, Rotate: -180° to 180°, 0°
 held scale, Scale: 25% to 400% by ratios, 100%
 hardness, Hardness: 0% to 100%, 0%
 strength, Strength: 5% to 100%, 100%
+hold, Hold: 0% to 100%, 0%
 mask amount, Fill with: 0.001 x to 1e+05 x by ratios, 100 x
 brightness, By brightness: 1 x to 1e+05 x by ratios, 1 x
 tolerance, Tolerance: 1% to 100%, 20%

@@ -207,7 +207,7 @@ def test_the_brush_is_typed_in_pixels(robot: Robot, typed: str, pixels: float) -
 
 
 @pytest.mark.parametrize("typed", ["80", "80%", "80 %"])
-@pytest.mark.parametrize(("x", "name"), [(460, "hardness"), (620, "strength")])
+@pytest.mark.parametrize(("x", "name"), [(400, "hardness"), (520, "strength")])
 def test_shares_are_typed_in_percent(robot: Robot, typed: str, x: float, name: str) -> None:
     type_into(robot, x, 24, typed)
     assert getattr(robot.editor.state.brush, name) == pytest.approx(0.8)
@@ -843,17 +843,19 @@ def test_everything_about_the_brush_can_be_set_in_a_small_window(small: Robot) -
     changed = set()
     for x in range(60, int(width / scale) - 270, 16):
         small.editor.state.brush = before = replace(
-            small.editor.state.brush, radius=0.1, hardness=0.5, strength=0.5, local=0.5
+            small.editor.state.brush, radius=0.1, hardness=0.5, strength=0.5, hold=0.5, local=0.5
         )
         small.click(x * scale, 24 * scale)
         changed |= differing(small, before)
         small.frame(count=2)
         if small.editor.ui.has_popup:
-            for y in range(60, 240, 12):
-                small.editor.state.brush = before
-                small.click((x + 30) * scale, y * scale)
-                if small.editor.ui.has_popup:
-                    changed |= differing(small, before)
+            for down in (0, -1):  # what it has no room for is a turn of the wheel away
+                small.frame(Move((x + 30) * scale, 100 * scale), Wheel(0.0, down))
+                for y in range(60, 240, 12):
+                    small.editor.state.brush = before
+                    small.click((x + 30) * scale, y * scale)
+                    if small.editor.ui.has_popup:
+                        changed |= differing(small, before)
             small.key("escape")
             small.frame(count=2)
     assert changed == BRUSH

@@ -65,7 +65,7 @@ def paint(
     session.release()
 
 
-@pytest.mark.parametrize(("limit", "most"), [("MOST_WORDS", 250), ("MOST_NUMBERS", 200)])
+@pytest.mark.parametrize(("limit", "most"), [("MOST_WORDS", 260), ("MOST_NUMBERS", 200)])
 def test_whatever_can_be_painted_can_be_opened_again(
     limit: str, most: int, session: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
