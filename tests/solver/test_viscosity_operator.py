@@ -98,13 +98,13 @@ def test_one_viscosity_has_the_operator_of_a_mask_that_is_the_same_everywhere(
     device: Device, aspect: float, sides: tuple[bool, bool, bool, bool]
 ) -> None:
     """On cells of any shape, between walls that glide or stick."""
-    no_slip, shape = NoSlip(*sides, False), (7, 10)
-    viscosity, solid = np.full(shape, 3.0, np.float32), np.zeros(shape, bool)
+    no_slip, (columns, rows) = NoSlip(*sides, False), (10, 7)
+    viscosity, solid = np.full((rows, columns), 3.0, np.float32), np.zeros((rows, columns), bool)
     fields = device.upload(viscosity), device.upload(solid.astype(np.uint8))
-    multigrid = Multigrid(device, shape[::-1], (0.1, 0.1 * aspect))
+    multigrid = Multigrid(device, (columns, rows), (0.1, 0.1 * aspect))
     multigrid.set_coefficients(*fields, viscosity, solid, 0.02, no_slip, Plan())
     level, kappa = multigrid.finest, 3.0 * 0.02 / (0.1 * 0.1 * aspect)
-    uniform = Coefficients.uniform(kappa, shape[::-1], level.texels, level.shear, no_slip)
+    uniform = Coefficients.uniform(kappa, (columns, rows), level.texels, level.shear, no_slip)
     np.testing.assert_allclose(uniform.matrix(), level.coefficients().matrix(), atol=1e-5 * kappa)
     multigrid.release()
 
