@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
-from app.media.codecs.png import spread_key
+from app.media.codecs.decoding import quiet
 
 NONE, BACKGROUND, PREVIOUS = range(3)  # what becomes of a frame when the next one comes
-PNG_BITS = 24  # the place of the bits a channel in a PNG
+GIF = b"GIF"  # the start of one
 AT_ONCE = 2**20  # pixels that are mixed: in floats they take many times the memory
 
 
@@ -92,11 +91,10 @@ class Animation:
                 cleared = None if frame.is_empty else frame
             elif frame.disposal == NONE:
                 cleared = None
-        for frame, part in asked:
-            most -= frame.pixels
-            if not frame.is_empty and (most < 0 or _is_seen_through(frame, part)):
-                return True
-        return False
+        asked = [(frame, part) for frame, part in asked if not frame.is_empty]
+        if sum(frame.pixels for frame, _ in asked) > most:
+            return True
+        return any(_is_seen_through(frame, part) for frame, part in asked)
 
     def shown(self) -> Iterator[np.ndarray]:
         """What is seen of each frame in turn, (h, w, 4) uint8; the array is drawn on for the next."""
@@ -105,11 +103,8 @@ class Animation:
             place = canvas[frame.place]
             is_restored = frame.disposal == PREVIOUS and number > 0
             before = place.copy() if is_restored else None
-            drawn = _decoded(frame)
-            band = AT_ONCE // max(frame.width, 1) + 1
-            for rows in (slice(row, row + band) for row in range(0, frame.height, band)):
-                place[rows] = _over(drawn[rows], place[rows]) if frame.is_over else drawn[rows]
-            del drawn
+            for rows, drawn in _decoded(frame):
+                place[rows] = _over(drawn, place[rows]) if frame.is_over else drawn
             yield canvas
             if before is not None:
                 place[:] = before
@@ -117,55 +112,59 @@ class Animation:
                 place[:] = 0
 
 
-def _decoded(frame: Frame) -> np.ndarray:
-    """The pixels (h, w, 4) of a frame, in 8 bits."""
+def _decoded(frame: Frame) -> Iterator[tuple[slice, np.ndarray]]:
+    """The pixels (h, w, 4) of a frame in 8 bits, some rows after others: all at once take as much memory once more."""
     if frame.is_empty:
-        return np.zeros((frame.height, frame.width, 4), np.uint8)
+        return
+    band = AT_ONCE // frame.width + 1
     file = b"".join(frame.pieces)
-    if _bits(file) == 16:
-        deep = _deep(file)
-        grey, alpha = deep.shape[2] < 3, deep.shape[2] in (2, 4)
-        opaque = deep[..., -1:] if alpha else np.full_like(deep[..., :1], 255)
-        return np.concatenate([deep[..., [0, 0, 0] if grey else [0, 1, 2]], opaque], axis=2)
-    with _opened(file) as image:
-        return np.asarray(image.convert("RGBA"))[: frame.height, : frame.width]
+    image = _image(file) if file.startswith(GIF) else None
+    samples = _samples(file) if image is None else np.empty(0)
+    for rows in (slice(row, min(row + band, frame.height)) for row in range(0, frame.height, band)):
+        if image is None:
+            yield rows, _with_alpha(samples[rows])
+        else:
+            yield rows, np.asarray(image.crop((0, rows.start, frame.width, rows.stop)).convert("RGBA"))
 
 
 def _is_seen_through(frame: Frame, part: tuple[slice, slice]) -> bool:
     """Whether anything of a part of a frame's pixels is; nothing is made of them but this."""
     file = b"".join(frame.pieces)
+    if not file.startswith(GIF):
+        samples = _samples(file)
+        return samples.shape[2] in (2, 4) and bool(samples[part][..., -1].min() < 255)
     rows, columns = (range(length)[one] for length, one in zip((frame.height, frame.width), part, strict=True))
-    if _bits(file) == 16:
-        deep = _deep(file)
-        return deep.shape[2] in (2, 4) and bool(deep[part][..., -1].min() < 255)
-    with _opened(file) as image:
-        image = image.crop((columns.start, rows.start, columns.stop, rows.stop))
-        if image.mode == "P" and isinstance(key := image.info.get("transparency"), int):
-            return image.histogram()[key] > 0
-        if image.mode not in ("LA", "RGBA"):
-            image = image.convert("RGBA")
-        return image.getchannel("A").getextrema()[0] < 255
+    image = _image(file).crop((columns.start, rows.start, columns.stop, rows.stop))
+    if image.mode == "P" and isinstance(key := image.info.get("transparency"), int):
+        return image.histogram()[key] > 0
+    return image.convert("RGBA").getchannel("A").getextrema()[0] < 255
 
 
-def _bits(file: bytes) -> int:
-    return file[PNG_BITS] if file.startswith(b"\x89PNG") else 8
-
-
-def _deep(file: bytes) -> np.ndarray:
-    """The upper 8 of the 16 bits of a PNG, (h, w, channels)."""
-    import imagecodecs
-
-    deep: np.ndarray = imagecodecs.png_decode(file)
-    return (deep[..., None] if deep.ndim == 2 else deep).astype("<u2", copy=False).view(np.uint8)[..., 1::2]
-
-
-@contextmanager
-def _opened(file: bytes) -> Iterator[Any]:
+def _image(file: bytes) -> Any:
+    """Pillow's image of a GIF, which has a byte a pixel."""
     from PIL import Image
 
-    with Image.open(io.BytesIO(file), formats=["PNG", "GIF"]) as image:
-        spread_key(image, _bits(file))
-        yield image
+    return Image.open(io.BytesIO(file), formats=["GIF"])
+
+
+def _samples(file: bytes) -> np.ndarray:
+    """The samples of a PNG, (h, w, channels), of 16 bits the upper 8; those of few bits or a palette are spread."""
+    import imagecodecs
+
+    with quiet():
+        samples: np.ndarray = imagecodecs.png_decode(file)
+    samples = samples[..., None] if samples.ndim == 2 else samples
+    return samples if samples.dtype == np.uint8 else samples.astype("<u2", copy=False).view(np.uint8)[..., 1::2]
+
+
+def _with_alpha(samples: np.ndarray) -> np.ndarray:
+    """Grey or colours, with alpha or none, as colours with alpha."""
+    channels = samples.shape[2]
+    if channels == 4:
+        return samples
+    colours = samples[..., [0, 0, 0]] if channels < 3 else samples
+    alpha = samples[..., 1:] if channels == 2 else np.full_like(samples[..., :1], 255)
+    return np.concatenate([colours, alpha], axis=2)
 
 
 def _over(drawn: np.ndarray, below: np.ndarray) -> np.ndarray:
