@@ -1,4 +1,4 @@
-"""Frames that are laid over one another, as those of an animated PNG or GIF."""
+"""Frames that are laid over one another, as those of an animated PNG, GIF or WebP."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 from app.media.codecs.decoding import quiet
 
 NONE, BACKGROUND, PREVIOUS = range(3)  # what becomes of a frame when the next one comes
-GIF = b"GIF"  # the start of one
+PNG, GIF = b"\x89PNG", b"GIF"  # the start of one
 AT_ONCE = 2**20  # pixels that are mixed: in floats they take many times the memory
 
 
@@ -26,7 +26,7 @@ class Frame:
         seconds: that it is shown.
         disposal: one of the three above.
         is_over: it is laid over what is there, and does not replace it.
-        pieces: of a file, PNG or GIF, of it alone.
+        pieces: of a file, PNG, GIF or WebP, of it alone.
         is_opaque: nothing of it can be seen through, by the kind of its samples.
         pixels: of that file, which may reach beyond its place.
     """
@@ -51,6 +51,10 @@ class Frame:
         right, bottom = self.x + self.width, self.y + self.height
         beyond = other.x + other.width > right or other.y + other.height > bottom
         return not beyond and other.x >= self.x and other.y >= self.y
+
+    def hides(self, size: tuple[int, int]) -> bool:
+        """Whether nothing can be seen through, wherever in a picture of this size."""
+        return self.is_opaque and (self.width, self.height) == size
 
     @property
     def place(self) -> tuple[slice, slice]:
@@ -104,7 +108,10 @@ class Animation:
             is_restored = frame.disposal == PREVIOUS and number > 0
             before = place.copy() if is_restored else None
             for rows, drawn in _decoded(frame):
-                place[rows] = _over(drawn, place[rows]) if frame.is_over else drawn
+                if frame.is_over and not frame.is_opaque:
+                    _lay_over(drawn, place[rows])
+                else:
+                    place[rows] = drawn
             yield canvas
             if before is not None:
                 place[:] = before
@@ -148,11 +155,12 @@ def _image(file: bytes) -> Any:
 
 
 def _samples(file: bytes) -> np.ndarray:
-    """The samples of a PNG, (h, w, channels), of 16 bits the upper 8; those of few bits or a palette are spread."""
+    """The samples of a PNG or WebP, (h, w, channels), of 16 bits the upper 8, of few bits or a palette spread."""
     import imagecodecs
 
+    decode = imagecodecs.png_decode if file.startswith(PNG) else imagecodecs.webp_decode
     with quiet():
-        samples: np.ndarray = imagecodecs.png_decode(file)
+        samples: np.ndarray = decode(file)
     samples = samples[..., None] if samples.ndim == 2 else samples
     return samples if samples.dtype == np.uint8 else samples.astype("<u2", copy=False).view(np.uint8)[..., 1::2]
 
@@ -167,11 +175,19 @@ def _with_alpha(samples: np.ndarray) -> np.ndarray:
     return np.concatenate([colours, alpha], axis=2)
 
 
-def _over(drawn: np.ndarray, below: np.ndarray) -> np.ndarray:
-    """Straight colours (h, w, 4) over others; what covers all or nothing changes no bit."""
-    own = drawn[..., 3:].astype(np.float32) / 255
-    rest = below[..., 3:].astype(np.float32) / 255 * (1 - own)
+def _lay_over(drawn: np.ndarray, below: np.ndarray) -> None:
+    """Lay straight colours (h, w, 4) over others; what covers all or nothing changes no bit."""
+    alpha = drawn[..., 3]
+    np.copyto(below, drawn, where=(alpha == 255)[..., None])
+    partly = (alpha > 0) & (alpha < 255)
+    if partly.any():
+        below[partly] = _mixed(drawn[partly], below[partly])
+
+
+def _mixed(drawn: np.ndarray, below: np.ndarray) -> np.ndarray:
+    """What is seen of straight colours (n, 4) over others."""
+    own = drawn[:, 3:].astype(np.float32) / 255
+    rest = below[:, 3:].astype(np.float32) / 255 * (1 - own)
     alpha = own + rest
-    colours = (drawn[..., :3] * own + below[..., :3] * rest) / np.where(alpha > 0, alpha, 1)
-    mixed = (np.concatenate([colours, 255 * alpha], axis=2) + 0.5).astype(np.uint8)
-    return np.where(drawn[..., 3:] == 255, drawn, np.where(drawn[..., 3:] == 0, below, mixed))
+    colours = (drawn[:, :3] * own + below[:, :3] * rest) / alpha
+    return (np.concatenate([colours, 255 * alpha], axis=1) + 0.5).astype(np.uint8)
