@@ -1042,11 +1042,14 @@ def test_names_that_cannot_be_written(tmp_path: Path):
     picture = Picture(smooth(3))
     (tmp_path / "folder.png").mkdir()
     (tmp_path / "device.png").symlink_to("/dev/null")
+    (tmp_path / "file").touch()
     for name, message in {
         "a.bmp": "must end in one of .png .jpg",
         "a": "must end in one of",
         "folder.png": "it is a folder",
         "nowhere/a.png": "there is no folder",
+        "file/a.png": "a part of its path is a file; choose another folder",
+        "file/in/a.png": "a part of its path is a file; choose another folder",
         "device.png": "it is not an ordinary file",
     }.items():
         with pytest.raises(UserError, match=message):
@@ -1066,7 +1069,7 @@ def test_names_that_cannot_be_written(tmp_path: Path):
     os.close(writing)
     with pytest.raises(UserError, match="WebP holds no side longer than 16383; make it smaller"):
         write_picture(tmp_path / "a.webp", Picture(np.zeros((1, 17000, 3), np.uint8)))
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["device.png", "folder.png"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["device.png", "file", "folder.png"]
 
 
 @pytest.mark.parametrize("name", ["x.png", "work.fluidwarp"])
