@@ -7,7 +7,7 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import accumulate
 from math import gcd, lcm
 from pathlib import Path
@@ -16,7 +16,7 @@ from app.errors import Cancelled, UserError
 from app.media.clip import DEEP, SHALLOW, WHOLE, FileClip, FrameRange, has_changed
 from app.media.codecs import apng, gif, pillow, tiff, webp
 from app.media.codecs.decoding import decoding, head_of
-from app.media.codecs.layered import Animation
+from app.media.codecs.layered import MOST_FRAMES, Animation, TooManyFrames
 from app.media.formats import kind_of
 from app.media.inputs import MAX_PIXELS, SIZE, open_input, state_of
 from app.media.losses import lost
@@ -172,18 +172,22 @@ def _layered(kind: str, path: Path, max_pixels: int) -> Animation | None:
         loop = image.info.get("loop")
     with open_input(path, "clip") as stream:
         data = stream.read()
-    match kind:
-        case "PNG":
-            found = apng.read(data)
-        case "GIF":
-            found = gif.frames(data, loop)
-        case _:
-            found = webp.frames(data)
+    try:
+        match kind:
+            case "PNG":
+                found = apng.read(data)
+            case "GIF":
+                found = gif.frames(data, loop)
+            case _:
+                found = webp.frames(data)
+    except TooManyFrames:
+        raise UserError(f"Cannot read {path}: it has more than {MOST_FRAMES} frames; cut it into parts.") from None
     if found is not None and max(frame.pixels for frame in found.frames) > max_pixels:
         raise pillow.too_large(path, max_pixels)
     return found
 
 
+@lru_cache
 def _shown_for(milliseconds: Fraction) -> Fraction:
     """The seconds that a frame is shown."""
     return (milliseconds or Fraction(UNTOLD)).limit_denominator(1000) / 1000

@@ -15,7 +15,9 @@ import pytest
 from PIL import Image
 
 from app.errors import UserError
-from app.media.codecs import apng
+from app.media import pages
+from app.media.codecs import apng, layered, pillow
+from app.media.codecs import gif as gif_codec
 from app.media.ffmpeg import executable
 from app.media.pages import read_pages
 from app.media.pictures import read_picture
@@ -390,6 +392,34 @@ def test_a_damaged_animated_webp_is_told_as_that(tmp_path: Path, fault: str):
     (path := tmp_path / "a.webp").write_bytes(data)
     with pytest.raises(UserError, match=r"a\.webp: the WebP file is truncated or damaged .*; get it again\.$"):
         read_pages(path, read_picture(path))
+
+
+@pytest.mark.parametrize("kind", ["png", "gif", "webp"])
+def test_of_an_animation_no_more_frames_are_read_than_a_bound(
+    tmp_path: Path, kind: str, monkeypatch: pytest.MonkeyPatch
+):
+    for module in (layered, apng, gif_codec, pages, pillow):
+        monkeypatch.setattr(module, "MOST_FRAMES", 3)
+    parts: list[Part] = [(0, 0, np.full((HEIGHT, WIDTH, 4), 90 + number), 0, 1) for number in range(4)]
+    numbers = [(0, 0, np.zeros((HEIGHT, WIDTH), int), 0, None)] * 4
+    for count in (3, 4):
+        match kind:
+            case "png":
+                data = encoded(parts[:count])
+            case "gif":
+                data = gif(numbers[:count], np.zeros((8, 3)))
+            case _:
+                data = webp(parts[:count], told=True)
+        (path := tmp_path / f"a.{kind}").write_bytes(data)
+        first = read_picture(path)
+        if count == 3:
+            clip = read_pages(path, first)
+            assert clip is not None
+            assert (clip.frames, first.note) == (3, f"a.{kind}: of its 3 frames only the first is used")
+        else:
+            assert first.note == f"a.{kind}: of its more than 3 frames only the first is used"
+            with pytest.raises(UserError, match=r"^Cannot read .*: it has more than 3 frames; cut it into parts\.$"):
+                read_pages(path, first)
 
 
 def test_a_still_is_no_animation(tmp_path: Path):

@@ -8,14 +8,16 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
 from fractions import Fraction
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
 
 from app.media.codecs import pillow
-from app.media.codecs.layered import BACKGROUND, NONE, PREVIOUS, Animation, Frame
+from app.media.codecs.layered import BACKGROUND, MOST_FRAMES, NONE, PREVIOUS, Animation, Frame, bounded
 from app.media.inputs import read_start
 from app.model.picture import Picture
 
@@ -27,13 +29,20 @@ def read(file: Path, max_pixels: int) -> Picture:
     """The first frame of a GIF."""
     with pillow.opened("GIF", file, max_pixels) as image:
         left, top, right, bottom = image.tile[0][1]
-        losses = unkept(read_start(file, "picture", HEAD))
+        losses, count = unkept(read_start(file, "picture", HEAD)), _count(file.read_bytes())
         if (left, top, right, bottom) == (0, 0, *image.size):
-            return pillow.picture_of(image, file, losses)
+            return pillow.picture_of(image, file, losses, count=count)
         pixels = np.zeros((image.height, image.width, 4), np.uint8)
         place = slice(top, bottom), slice(left, right)
         pixels[place] = np.asarray(image.convert("RGBA"))[place]
-        return pillow.picture_of(image, file, losses, pixels)
+        return pillow.picture_of(image, file, losses, pixels, count)
+
+
+def _count(data: bytes) -> int:
+    """How many frames there are, or one more than are read; 1 where those after the first are damaged."""
+    with suppress(IndexError, struct.error):
+        return sum(1 for _ in islice(_frames(data, HEAD + len(_table(data, HEAD, data[10])), b""), MOST_FRAMES + 1))
+    return 1
 
 
 def unkept(head: bytes) -> list[str]:
@@ -49,7 +58,7 @@ def frames(data: bytes, loop: int | None) -> Animation | None:
     """
     try:
         table = _table(data, HEAD, data[10])
-        found = list(_frames(data, HEAD + len(table), table))
+        found = bounded(_frames(data, HEAD + len(table), table))
         width, height = struct.unpack_from("<HH", data, 6)
     except (IndexError, struct.error):
         raise ValueError("a frame of it is cut") from None

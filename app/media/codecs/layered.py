@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,12 @@ from app.media.codecs.decoding import quiet
 
 NONE, BACKGROUND, PREVIOUS = range(3)  # what becomes of a frame when the next one comes
 PNG, GIF = b"\x89PNG", b"GIF"  # the start of one
+MOST_FRAMES = 100_000  # of an animation: at 30 a second nearly an hour
 AT_ONCE = 2**20  # pixels that are mixed: in floats they take many times the memory
+
+
+class TooManyFrames(ValueError):
+    """An animation has more than `MOST_FRAMES`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +104,8 @@ class Animation:
         asked = [(frame, part) for frame, part in asked if not frame.is_empty]
         if sum(frame.pixels for frame, _ in asked) > most:
             return True
-        return any(_is_seen_through(frame, part) for frame, part in asked)
+        with quiet():
+            return any(_is_seen_through(frame, part) for frame, part in asked)
 
     def shown(self) -> Iterator[np.ndarray]:
         """What is seen of each frame in turn, (h, w, 4) uint8; the array is drawn on for the next."""
@@ -117,6 +124,14 @@ class Animation:
                 place[:] = before
             elif frame.disposal != NONE:
                 place[:] = 0
+
+
+def bounded(frames: Iterable[Frame]) -> list[Frame]:
+    """The frames as they come. Raises `TooManyFrames`."""
+    found = list(islice(frames, MOST_FRAMES + 1))
+    if len(found) > MOST_FRAMES:
+        raise TooManyFrames
+    return found
 
 
 def _decoded(frame: Frame) -> Iterator[tuple[slice, np.ndarray]]:

@@ -8,10 +8,11 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator
 from fractions import Fraction
+from itertools import islice
 from pathlib import Path
 
 from app.media.codecs import pillow
-from app.media.codecs.layered import BACKGROUND, NONE, Animation, Frame
+from app.media.codecs.layered import BACKGROUND, NONE, Animation, Frame, bounded
 from app.model.picture import Picture
 
 HEAD = 12  # bytes of the header of the file; each chunk has one of 8
@@ -23,22 +24,28 @@ CLEARED, REPLACES = 1, 2  # in the flags of a frame
 def read(file: Path, max_pixels: int) -> Picture:
     """The first frame of a WebP."""
     with pillow.opened("WEBP", file, max_pixels) as image:
-        found = frames(file.read_bytes()) if image.is_animated and image.mode == "RGB" else None
+        found = frames(file.read_bytes(), 1) if image.is_animated and image.mode == "RGB" else None
         is_opaque = found is None or found.frames[0].hides(image.size)
         return pillow.picture_of(image, file, [], None if found is None or is_opaque else next(found.shown()))
 
 
-def frames(data: bytes) -> Animation | None:
-    """What is in a file; None if it is no animation. Raises `ValueError` if it is damaged."""
-    size, plays, found = None, 1, list[Frame]()
+def frames(data: bytes, most: int | None = None) -> Animation | None:
+    """What is in a file, of its frames the first `most`; None if it is no animation.
+
+    Raises `ValueError` if it is damaged, and `TooManyFrames`.
+    """
+    size, plays = None, 1
     for kind, body in _chunks(data, HEAD):
         if kind == b"VP8X" and len(body) >= 10:
             size = _u24(body, 4) + 1, _u24(body, 7) + 1
         elif kind == b"ANIM" and len(body) >= 6:
             (plays,) = struct.unpack_from("<H", body, 4)
-        elif kind == b"ANMF" and size is not None:
-            found.append(_frame(body, size))
-    return Animation(size, found, plays) if size is not None and found else None
+        elif kind == b"ANMF":
+            break
+    if size is None:
+        return None
+    found = bounded(islice((_frame(body, size) for kind, body in _chunks(data, HEAD) if kind == b"ANMF"), most))
+    return Animation(size, found, plays) if found else None
 
 
 def _u24(data: bytes, at: int) -> int:
