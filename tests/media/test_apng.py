@@ -292,6 +292,20 @@ def test_frames_of_a_gif_are_laid_over_one_another_as_browsers_do_it(tmp_path: P
         np.testing.assert_array_equal(read.pixels[..., :3][seen], canvas[..., :3][seen])
 
 
+def test_what_is_no_block_of_a_gif_is_passed_over(tmp_path: Path):
+    numbers = [(0, 0, np.full((HEIGHT, WIDTH), number), 0, None) for number in (1, 2)]
+    colours = np.arange(24).reshape(8, 3)
+    one, both = gif(numbers[:1], colours)[:-1], gif(numbers, colours)[:-1]
+    second, none = both[len(one) :], bytes(range(32)) * 40  # no sign of a block is in it
+    for end in (b"", b";"):
+        (path := tmp_path / "a.gif").write_bytes(one + none + second + none + end)
+        first = read_picture(path)
+        clip = read_pages(path, first)
+        assert clip is not None
+        assert first.note == "a.gif: of its 2 frames only the first is used"
+        assert [picture.pixels[0, 0].tolist() for _, picture in clip.pictures()] == [[3, 4, 5], [6, 7, 8]]
+
+
 def riff(kind: bytes, body: bytes) -> bytes:
     return kind + struct.pack("<I", len(body)) + body + b"\0" * (len(body) % 2)
 

@@ -6,6 +6,7 @@ frame that does not say what becomes of it fare as the one before it.
 
 from __future__ import annotations
 
+import re
 import struct
 from collections.abc import Iterator
 from contextlib import suppress
@@ -22,6 +23,7 @@ from app.media.inputs import read_start
 from app.model.picture import Picture
 
 CONTROL, IMAGE, EXTENSION, END = 0xF9, 0x2C, 0x21, 0x3B
+BLOCK = re.compile(b"[!,;]")  # what starts one
 HEAD = 13  # bytes of the header and the screen
 
 
@@ -110,7 +112,8 @@ def _frames(data: bytes, at: int, common: bytes) -> Iterator[Frame]:
             yield Frame(x, y, width, height, seconds, disposal, True, pieces, not has_key, width * height)
             at, control = end, bytes(4)
         else:  # between blocks Pillow passes over what is none
-            at += 1
+            found = BLOCK.search(data, at)
+            at = len(data) if found is None else found.start()
 
 
 def _after_blocks(data: bytes, at: int) -> int:
