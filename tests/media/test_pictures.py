@@ -24,6 +24,7 @@ from PIL.PngImagePlugin import PngInfo
 
 from app.errors import UserError
 from app.media import files
+from app.media.codecs import png
 from app.media.codecs.cmyk import cmyk_to_rgb
 from app.media.codecs.exr import read_channels
 from app.media.codecs.metadata import upright_dpi
@@ -1036,6 +1037,19 @@ def test_an_enormous_claim_is_refused_before_decoding(tmp_path: Path):
         PngImagePlugin.putchunk(stream, b"IDAT", b"")
     with pytest.raises(UserError, match=r"60000 x 60000 pixels are more than the limit"):
         read_picture(path)
+
+
+def test_of_a_png_no_more_chunks_are_looked_at_than_a_bound(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    write_picture(tmp_path / "a.png", Picture(smooth(3)))
+    data = (tmp_path / "a.png").read_bytes()
+    count, at = 0, 8
+    while at < len(data):
+        at, count = at + 12 + int.from_bytes(data[at : at + 4], "big"), count + 1
+    monkeypatch.setattr(png, "MOST_CHUNKS", count)
+    assert read_picture(tmp_path / "a.png").width
+    monkeypatch.setattr(png, "MOST_CHUNKS", count - 1)
+    with pytest.raises(UserError, match=rf"a\.png: it has more than {count - 1} chunks; save it anew"):
+        read_picture(tmp_path / "a.png")
 
 
 def test_names_that_cannot_be_written(tmp_path: Path):
