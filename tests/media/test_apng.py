@@ -306,6 +306,16 @@ def test_what_is_no_block_of_a_gif_is_passed_over(tmp_path: Path):
         assert [picture.pixels[0, 0].tolist() for _, picture in clip.pictures()] == [[3, 4, 5], [6, 7, 8]]
 
 
+def test_of_a_gif_no_more_blocks_are_looked_at_than_a_bound(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    data = gif([(0, 0, np.zeros((HEIGHT, WIDTH), int), 0, None)] * 2, np.zeros((8, 3)))
+    (path := tmp_path / "a.gif").write_bytes(data[:-1] + b"!\xfe\0" * 5 + data[-1:])
+    monkeypatch.setattr(gif_codec, "MOST_EXTENSIONS", 7)
+    assert read_pages(path, read_picture(path)) is not None
+    monkeypatch.setattr(gif_codec, "MOST_EXTENSIONS", 6)
+    with pytest.raises(UserError, match=r"it has more than 6 blocks that are no picture\); get it again\.$"):
+        read_picture(path)
+
+
 def riff(kind: bytes, body: bytes) -> bytes:
     return kind + struct.pack("<I", len(body)) + body + b"\0" * (len(body) % 2)
 

@@ -24,6 +24,7 @@ from app.model.picture import Picture
 
 CONTROL, IMAGE, EXTENSION, END = 0xF9, 0x2C, 0x21, 0x3B
 BLOCK = re.compile(b"[!,;]")  # what starts one
+MOST_EXTENSIONS = 500_000  # of a file: an animation has one a frame
 HEAD = 13  # bytes of the header and the screen
 
 
@@ -89,9 +90,12 @@ def _table(data: bytes, at: int, flags: int) -> bytes:
 
 def _frames(data: bytes, at: int, common: bytes) -> Iterator[Frame]:
     """The frames from a place on; those without a table of their own have the common one."""
-    control, kinds = bytes(4), {2: BACKGROUND, 3: PREVIOUS}
+    control, kinds, extensions = bytes(4), {2: BACKGROUND, 3: PREVIOUS}, 0
     while at < len(data) and data[at] != END:
         if data[at] == EXTENSION:
+            extensions += 1
+            if extensions > MOST_EXTENSIONS:
+                raise ValueError(f"it has more than {MOST_EXTENSIONS} blocks that are no picture")
             if data[at + 1] == CONTROL:
                 control = data[at + 3 : at + 7]
             at = _after_blocks(data, at + 2)
