@@ -126,7 +126,8 @@ def _encoder() -> Finding:
 def ask(module: str, **environment: str) -> dict:
     """What `python -m module` prints as JSON, or {"error": why it did not}."""
     environment = {
-        **os.environ, "PYTHONPATH": os.pathsep.join([str(Path(app.__path__[0]).parent), *sys.path]), **environment
+        **os.environ, "PYTHONPATH": os.pathsep.join([str(Path(app.__path__[0]).parent), *sys.path]),
+        "EGL_LOG_LEVEL": "warning", **environment
     }  # fmt: skip
     try:
         ran = subprocess.run(
@@ -134,10 +135,13 @@ def ask(module: str, **environment: str) -> dict:
         )
     except subprocess.TimeoutExpired:
         return {"error": f"no answer within {PATIENCE} s"}
-    if ran.returncode == 0:
-        return json.loads(ran.stdout)
-    last = ran.stderr.strip().splitlines()[-1:] or [f"it ended with status {ran.returncode}"]
-    return {"error": last[0]}
+    said = ran.stderr.strip().splitlines()[-1:]
+    if ran.returncode:
+        return {"error": (said or [f"it ended with status {ran.returncode}"])[0]}
+    found = json.loads(ran.stdout)
+    if "error" in found and said:
+        found["error"] += f"; the driver says: {said[0]}"
+    return found
 
 
 def _probe_headless() -> dict:

@@ -10,6 +10,7 @@ def main() -> None:
     Ctrl+C ends the process at once wherever no job has taken it over (see `app.progress.interruptible`): a module that
     is being loaded, above all one in C, can make anything of an exception.
     """
+    os.environ.setdefault("EGL_LOG_LEVEL", "fatal")  # what Mesa complains of, our sentence and the doctor tell
     try:
         import signal
 

@@ -277,6 +277,17 @@ def test_doctor_fails_where_something_vital_is_missing(folder: Path):
         assert any(whole in line for line in ran.stdout.splitlines()), "a command to copy stays on its line"
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="of Mesa")
+def test_where_there_is_no_driver_one_sentence_says_so_and_doctor_has_the_drivers_own_words(folder: Path):
+    (folder / "b.toml").write_text(RECIPE)
+    nothing = {"LIBGL_DRIVERS_PATH": str(folder), "GALLIUM_DRIVER": "nonsense", "DISPLAY": "", "WAYLAND_DISPLAY": ""}
+    ran = process(folder, "render", "b.toml", "-o", "b.png", **nothing)
+    assert ran.returncode == 1
+    (line,) = ran.stderr.splitlines()
+    assert line.startswith("fluidwarp: no OpenGL 3.3 without a window")
+    assert "the driver says: libEGL" in " ".join(process(folder, "doctor", **nothing).stdout.split())
+
+
 def test_doctor_finds_what_is_missing(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(doctor, "LIBRARIES", ("numpy", "no-such-library"))
     found = next(finding for finding in doctor.examine() if finding.name == "libraries")

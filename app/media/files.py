@@ -81,6 +81,8 @@ def writable(path: str | os.PathLike[str]) -> Path:
             raise UserError(f"Cannot write {path}: it is a folder; give the name of a file in it.")
         if os.path.exists(path) and not os.path.isfile(path):  # a pipe's real path is no file's name
             raise UserError(f"Cannot write {path}: it is not an ordinary file; give another name.")
+        if any(folder.is_file() for folder in target.parents):
+            raise cannot_write(path, OSError(errno.ENOTDIR, ""))
         if not target.parent.is_dir():
             raise UserError(f"Cannot write {path}: there is no folder {target.parent}; make it first.")
         if target.exists() and (number := _forbidden(target, os.W_OK)):  # it would be replaced all the same

@@ -7,19 +7,16 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import accumulate
 from math import gcd, lcm
 from pathlib import Path
-from typing import Any
-
-import numpy as np
 
 from app.errors import Cancelled, UserError
 from app.media.clip import DEEP, SHALLOW, WHOLE, FileClip, FrameRange, has_changed
 from app.media.codecs import apng, gif, pillow, tiff, webp
 from app.media.codecs.decoding import decoding, head_of
-from app.media.codecs.layered import Animation
+from app.media.codecs.layered import MOST_FRAMES, Animation, TooManyFrames
 from app.media.formats import kind_of
 from app.media.inputs import MAX_PIXELS, SIZE, open_input, state_of
 from app.media.losses import lost
@@ -104,26 +101,20 @@ class Pages(FileClip):
     @contextmanager
     def _reader(self) -> Iterator[Callable[[int], Picture]]:
         """What gives one frame after another, by rising numbers; those between are decoded only if they must."""
-        layered = _layered(self.kind, self.path, self.max_pixels)
-        if layered is not None:
-            shown = enumerate(layered.shown())
-
-            def of_layers(number: int) -> Picture:
-                canvas = next(canvas for at, canvas in shown if at == number)
-                return Picture((canvas if self.alpha else canvas[..., :3]).copy())
-
-            yield of_layers
-        elif self.kind == "TIFF":
+        if self.kind == "TIFF":
             with tiff.opened(self.path) as file:
                 yield lambda number: tiff.page_of(file, self.path, self.max_pixels, self.places[number])
-        else:
-            with pillow.opened(ANIMATED[self.kind], self.path, self.max_pixels) as image:
+            return
+        layered = _layered(self.kind, self.path, self.max_pixels)
+        if layered is None:
+            raise ValueError("it is no animation any more")
+        shown = enumerate(layered.shown())
 
-                def of_image(number: int) -> Picture:
-                    image.seek(number)
-                    return Picture(np.asarray(image.convert("RGBA" if self.alpha else "RGB")))
+        def of_layers(number: int) -> Picture:
+            canvas = next(canvas for at, canvas in shown if at == number)
+            return Picture((canvas if self.alpha else canvas[..., :3]).copy())
 
-                yield of_image
+        yield of_layers
 
 
 def read_pages(path: Path, first: Picture, max_pixels: int = MAX_PIXELS) -> Pages | None:
@@ -169,50 +160,34 @@ def read_pages(path: Path, first: Picture, max_pixels: int = MAX_PIXELS) -> Page
 def _animation(kind: str, path: Path, max_pixels: int) -> tuple[list[Fraction], bool, int]:
     """The durations of an animation's frames, in seconds, whether any has alpha, and how often it plays."""
     layered = _layered(kind, path, max_pixels)
-    if layered is not None:
-        durations = [_shown_for(1000 * one.seconds) for one in layered.frames]
-        return durations, layered.has_alpha(max_pixels), layered.plays
-    if kind != "WebP":
+    if layered is None:
         return [], False, 0
-    with pillow.opened("WEBP", path, max_pixels) as image:
-        if not getattr(image, "is_animated", False):
-            return [], False, 0
-        with open_input(path, "clip") as stream:
-            told = webp.durations(stream.read())
-        if len(told) != image.n_frames:
-            raise ValueError(f"it has {len(told)} of its {image.n_frames} frames")
-        durations = [_shown_for(Fraction(one)) for one in told]
-        return durations, _is_seen_through(image, max_pixels), image.info.get("loop") or 0
-
-
-def _is_seen_through(image: Any, most: int) -> bool:
-    """Whether a frame of a WebP has alpha; believed if looking would take more than `most` pixels."""
-    if not image.has_transparency_data:  # what says so is the head of the file
-        return False
-    for place in range(image.n_frames):
-        most -= image.width * image.height
-        if most < 0:
-            return True
-        image.seek(place)
-        if image.getchannel("A").getextrema()[0] < 255:
-            return True
-    return False
+    durations = [_shown_for(1000 * one.seconds) for one in layered.frames]
+    return durations, layered.has_alpha(max_pixels), layered.plays
 
 
 def _layered(kind: str, path: Path, max_pixels: int) -> Animation | None:
-    """The frames of an animation that are to be laid over one another here. Raises `UserError` if one is too large."""
-    if kind not in ("GIF", "PNG"):
-        return None
-    with pillow.opened(kind, path, max_pixels) as image:  # which is not too large
+    """The frames of an animation; None if it is none. Raises `UserError` if one is too large."""
+    with pillow.opened(ANIMATED[kind], path, max_pixels) as image:  # which is not too large
         loop = image.info.get("loop")
     with open_input(path, "clip") as stream:
         data = stream.read()
-    found = apng.read(data) if kind == "PNG" else gif.frames(data, loop)
+    try:
+        match kind:
+            case "PNG":
+                found = apng.read(data)
+            case "GIF":
+                found = gif.frames(data, loop)
+            case _:
+                found = webp.frames(data)
+    except TooManyFrames:
+        raise UserError(f"Cannot read {path}: it has more than {MOST_FRAMES} frames; cut it into parts.") from None
     if found is not None and max(frame.pixels for frame in found.frames) > max_pixels:
         raise pillow.too_large(path, max_pixels)
     return found
 
 
+@lru_cache
 def _shown_for(milliseconds: Fraction) -> Fraction:
     """The seconds that a frame is shown."""
     return (milliseconds or Fraction(UNTOLD)).limit_denominator(1000) / 1000

@@ -561,10 +561,7 @@ class _Search:
             f"ends {most:.3g} pixels from where it should be",
             f"end up to {most:.3g} pixels from where they should be",
         )
-        said = list(objections(trial.recipe.handle, trial.recipe.pin, (self.extent[0], self.extent[1])))
-        self.notices += (
-            [said[0] + (f"; there are {len(said) - 1} more conflicts" if len(said) > 1 else "")] if said else []
-        )
+        self._explain(trial.recipe, bool(missed))
         arrived = np.stack([self.pairs[:, 0], trial.arrived], axis=1)[self.numbers]
         pairs = Pairs(arrived, tuple(self.aim.pairs.curves[number] for number in self.numbers))
         is_met = not (missed or trial.folds) and len(self.numbers) == len(self.pairs)
@@ -653,6 +650,17 @@ class _Search:
         if len(numbers):
             named = few([self._label(number) for number in numbers])
             self.notices.append(f"{named} {of_one if len(numbers) == 1 else of_more}")
+
+    def _explain(self, recipe: Recipe, has_missed: bool) -> None:
+        """Note which handles are in each other's way, with what has been said of those that missed, if any."""
+        said = list(objections(recipe.handle, recipe.pin, (self.extent[0], self.extent[1])))
+        if not said:
+            return
+        more = len(said) - 1
+        counted = "1 more conflict is there" if more == 1 else f"{more} more conflicts are there"
+        told = said[0] + (f"; {counted}" if more else "")
+        missed = [self.notices.pop()] if has_missed else []
+        self.notices.append("; ".join([*missed, told]))
 
     def _usable(self, base: Recipe) -> np.ndarray:
         """The numbers of the pairs that get a handle; of the others it is noted why not."""

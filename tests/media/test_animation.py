@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -760,6 +761,27 @@ def test_black_grey_and_white_of_a_clip_are_as_the_standard_says(tmp_path: Path,
     assert np.abs(seen[..., :3] - wanted[..., None]).max() < (1 if bits == 8 else 4)
     if len(frame) == 4:
         assert np.abs(seen[..., 3] - np.linspace(0, top, 64).round() / top * most).max() < 1
+
+
+@pytest.mark.parametrize(("kind", "dtype"), [("yuv444p", "u1"), ("yuv422p10le", "<u2"), ("yuva444p12le", "<u2")])
+def test_light_above_white_of_limited_range_is_white_and_below_black_black(tmp_path: Path, kind: str, dtype: str):
+    """Through all codes that a frame may have: nothing wraps around, and what lies between is as the standard says."""
+    bits = int(found[1]) if (found := re.search(r"(10|12)le", kind)) else 8
+    step, narrow = 2 ** (bits - 8), "422" in kind
+    codes = np.arange(step, 255 * step, dtype=dtype).repeat(2)  # 0 and 255 are for synchronisation
+    grey = np.full(codes.size // (2 if narrow else 1), 128 * step, dtype)
+    planes = [codes, grey, grey, *([np.full_like(codes, 2**bits - 1)] if "a" in kind else [])]
+    frame = b"".join(np.tile(plane, (8, 1)).tobytes() for plane in planes)
+    tags = ["-color_range", "tv", "-colorspace", "bt709"]
+    how = ["-f", "rawvideo", "-pix_fmt", kind, "-s", f"{codes.size}x8", "-r", "5", *tags, "-i", "-"]
+    command = [ffmpeg.executable(), "-v", "error", *how, "-c:v", "ffv1", *tags, str(tmp_path / "a.mkv")]
+    subprocess.run(command, input=frame, check=True)
+    (seen,) = read_clip(tmp_path / "a.mkv").read_frames()
+    most = np.iinfo(seen.dtype).max
+    wanted = ((codes.astype(float) - 16 * step) / (219 * step)).clip(0, 1) * most
+    assert np.abs(seen[..., :3] - wanted[None, :, None]).max() < (1 if bits == 8 else 4)
+    assert (seen[:, codes >= 235 * step, :3] == most).all()
+    assert not seen[:, codes <= 16 * step, :3].any()
 
 
 @pytest.mark.parametrize(

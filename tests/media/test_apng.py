@@ -1,7 +1,8 @@
-"""Frames of an animated PNG or GIF, against the laws of alpha in float64 and against ffmpeg; and damaged ones."""
+"""Frames of an animated PNG, GIF or WebP, against the laws of alpha in float64 and against ffmpeg; and damaged ones."""
 
 from __future__ import annotations
 
+import io
 import struct
 import subprocess
 import zlib
@@ -14,7 +15,9 @@ import pytest
 from PIL import Image
 
 from app.errors import UserError
-from app.media.codecs import apng
+from app.media import pages
+from app.media.codecs import apng, layered, pillow
+from app.media.codecs import gif as gif_codec
 from app.media.ffmpeg import executable
 from app.media.pages import read_pages
 from app.media.pictures import read_picture
@@ -136,6 +139,18 @@ def test_an_animation_has_alpha_only_where_something_is_seen_through(tmp_path: P
         assert found is not None
         assert found.has_alpha(400_000_000) == seen
         assert any(canvas[..., 3].min() < 255 for canvas in found.shown()) == seen
+
+
+def test_opening_decodes_nothing_where_that_is_too_much_to_look_at():
+    whole = np.full((HEIGHT, WIDTH, 4), 255)
+    data = encoded([(0, 0, whole, 0, 0)] * 3)
+    at = data.index(b"IDAT")
+    length = int.from_bytes(data[at - 4 : at], "big")
+    found = apng.read(data[: at - 4] + chunk(b"IDAT", b"no deflate") + data[at + 8 + length :])
+    assert found is not None
+    assert found.has_alpha(3 * HEIGHT * WIDTH - 1)
+    with pytest.raises(Exception, match="IDAT"):
+        found.has_alpha(3 * HEIGHT * WIDTH)
 
 
 def test_opening_decodes_no_frame_that_lies_over_what_is_opaque_and_no_more_than_a_picture(tmp_path: Path):
@@ -275,6 +290,160 @@ def test_frames_of_a_gif_are_laid_over_one_another_as_browsers_do_it(tmp_path: P
         seen = canvas[..., 3] > 0
         np.testing.assert_array_equal(read.pixels[..., 3] > 0 if read.has_alpha else np.ones_like(seen), seen)
         np.testing.assert_array_equal(read.pixels[..., :3][seen], canvas[..., :3][seen])
+
+
+def test_what_is_no_block_of_a_gif_is_passed_over(tmp_path: Path):
+    numbers = [(0, 0, np.full((HEIGHT, WIDTH), number), 0, None) for number in (1, 2)]
+    colours = np.arange(24).reshape(8, 3)
+    one, both = gif(numbers[:1], colours)[:-1], gif(numbers, colours)[:-1]
+    second, none = both[len(one) :], bytes(range(32)) * 40  # no sign of a block is in it
+    for end in (b"", b";"):
+        (path := tmp_path / "a.gif").write_bytes(one + none + second + none + end)
+        first = read_picture(path)
+        clip = read_pages(path, first)
+        assert clip is not None
+        assert first.note == "a.gif: of its 2 frames only the first is used"
+        assert [picture.pixels[0, 0].tolist() for _, picture in clip.pictures()] == [[3, 4, 5], [6, 7, 8]]
+
+
+def test_of_a_gif_no_more_blocks_are_looked_at_than_a_bound(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    data = gif([(0, 0, np.zeros((HEIGHT, WIDTH), int), 0, None)] * 2, np.zeros((8, 3)))
+    (path := tmp_path / "a.gif").write_bytes(data[:-1] + b"!\xfe\0" * 5 + data[-1:])
+    monkeypatch.setattr(gif_codec, "MOST_EXTENSIONS", 7)
+    assert read_pages(path, read_picture(path)) is not None
+    monkeypatch.setattr(gif_codec, "MOST_EXTENSIONS", 6)
+    with pytest.raises(UserError, match=r"it has more than 6 blocks that are no picture\); get it again\.$"):
+        read_picture(path)
+
+
+def riff(kind: bytes, body: bytes) -> bytes:
+    return kind + struct.pack("<I", len(body)) + body + b"\0" * (len(body) % 2)
+
+
+def webp(parts: Sequence[Part], told: bool, lossless: bool = True) -> bytes:
+    """An animated WebP that plays three times; `told`: its head says that it has alpha."""
+
+    def three(*numbers: int) -> bytes:
+        return b"".join(struct.pack("<I", number)[:3] for number in numbers)
+
+    body = riff(b"VP8X", struct.pack("<I", 0x12 if told else 2) + three(WIDTH - 1, HEIGHT - 1))
+    body += riff(b"ANIM", struct.pack("<IH", 0xFF0000FF, 3))
+    for number, (x, y, pixels, disposal, over) in enumerate(parts):
+        Image.fromarray(pixels.astype(np.uint8)).save(
+            file := io.BytesIO(), "WEBP", lossless=lossless, exact=True, quality=90
+        )
+        data, at, picture = file.getvalue(), 12, b""
+        while at + 8 <= len(data):
+            kind, length = struct.unpack_from("<4sI", data, at)
+            picture += data[at : at + 8 + length + length % 2] if kind in (b"ALPH", b"VP8 ", b"VP8L") else b""
+            at += 8 + length + length % 2
+        place = three(x // 2, y // 2, pixels.shape[1] - 1, pixels.shape[0] - 1, 100 * (number + 1))
+        body += riff(b"ANMF", place + bytes([disposal | (0 if over else 2)]) + picture)
+    return riff(b"RIFF", b"WEBP" + body)
+
+
+@pytest.mark.parametrize("told", [True, False])
+@pytest.mark.parametrize("seed", range(6))
+def test_frames_of_a_webp_are_laid_over_one_another_as_browsers_do_it(tmp_path: Path, seed: int, told: bool):
+    """By the law in float64: what no frame covers, or one clears, is transparent, whatever the file's head says."""
+    rng = np.random.default_rng(seed)
+    parts = list[Part]()
+    for number in range(6):
+        width, height = (int(rng.integers(1, most)) for most in (WIDTH, HEIGHT))
+        x, y = (int(rng.integers(0, (most - side) // 2 + 1)) * 2 for most, side in ((WIDTH, width), (HEIGHT, height)))
+        if number == 0 and seed % 2:
+            x, y, width, height = 0, 0, WIDTH, HEIGHT
+        pixels = some(rng, height, width)
+        pixels = pixels if rng.integers(2) else np.dstack([pixels[..., :3], np.full((height, width), 255)])
+        parts.append((x, y, pixels, int(rng.integers(2)), int(rng.integers(2))))
+    (path := tmp_path / "a.webp").write_bytes(webp(parts, told))
+    clip = read_pages(path, first := read_picture(path))
+    assert clip is not None
+    assert (clip.loops, clip.durations, clip.fps) == (3, (1, 2, 3, 4, 5, 6), 10)
+    canvases = composed(parts)
+    assert clip.alpha
+    for read, wanted in zip((picture for _, picture in clip.pictures()), canvases, strict=True):
+        seen = wanted[..., 3] > 0
+        assert np.abs(read.pixels - wanted)[seen].max(initial=0) < 1
+        assert not read.pixels[~seen, 3].any()
+    if first.has_alpha:
+        np.testing.assert_array_equal(first.pixels[..., 3] > 0, canvases[0][..., 3] > 0)
+    else:
+        assert (canvases[0][..., 3] == 255).all()
+
+
+@pytest.mark.parametrize("lossless", [True, False])
+@pytest.mark.parametrize("whole", [True, False])
+def test_what_no_frame_of_a_webp_covers_is_transparent_though_none_has_alpha(
+    tmp_path: Path, lossless: bool, whole: bool
+):
+    size = (HEIGHT, WIDTH) if whole else (4, 4)
+    parts: list[Part] = [(0, 0, np.full((*size, 3), 200), 0, 1), (6, 4, np.full((4, 4, 3), 90), 0, 1)]
+    (path := tmp_path / "a.webp").write_bytes(webp(parts, told=False, lossless=lossless))
+    first = read_picture(path)
+    clip = read_pages(path, first)
+    assert clip is not None
+    assert (clip.alpha, first.has_alpha) == (not whole, not whole)
+    if not whole:
+        pictures = [picture for _, picture in clip.pictures()]
+        assert [int((picture.pixels[..., 3] == 255).sum()) for picture in (first, *pictures)] == [16, 16, 32]
+        assert {int(one) for picture in pictures for one in np.unique(picture.pixels[..., 3])} == {0, 255}
+
+
+def test_frames_of_a_webp_with_losses_keep_their_alpha(tmp_path: Path):
+    pixels = np.full((HEIGHT, WIDTH, 4), [200, 90, 40, 255])
+    pixels[:, :5, 3] = 0
+    (path := tmp_path / "a.webp").write_bytes(webp([(0, 0, pixels, 0, 0)] * 2, told=True, lossless=False))
+    clip = read_pages(path, read_picture(path))
+    assert clip is not None
+    for _, picture in clip.pictures():
+        np.testing.assert_array_equal(picture.pixels[..., 3], pixels[..., 3])
+        assert np.abs(picture.pixels[:, 6:, :3] - pixels[:, 6:, :3].astype(int)).max() < 12
+
+
+@pytest.mark.parametrize("fault", ["beyond", "other size", "cut", "empty"])
+def test_a_damaged_animated_webp_is_told_as_that(tmp_path: Path, fault: str):
+    part = np.full((4, 4, 3), 90)
+    data = webp([(0, 0, part, 0, 1), (WIDTH - 2 if fault == "beyond" else 6, 4, part, 0, 1)], told=False)
+    last = data.rindex(b"ANMF")
+    if fault == "other size":
+        data = data[: last + 14] + b"\1" + data[last + 15 :]
+    elif fault == "cut":
+        data = data[: last + 30]
+    elif fault == "empty":
+        data = data[: last + 4] + struct.pack("<I", 16) + data[last + 8 : last + 24]
+        data = data[:4] + struct.pack("<I", len(data) - 8) + data[8:]
+    (path := tmp_path / "a.webp").write_bytes(data)
+    with pytest.raises(UserError, match=r"a\.webp: the WebP file is truncated or damaged .*; get it again\.$"):
+        read_pages(path, read_picture(path))
+
+
+@pytest.mark.parametrize("kind", ["png", "gif", "webp"])
+def test_of_an_animation_no_more_frames_are_read_than_a_bound(
+    tmp_path: Path, kind: str, monkeypatch: pytest.MonkeyPatch
+):
+    for module in (layered, apng, gif_codec, pages, pillow):
+        monkeypatch.setattr(module, "MOST_FRAMES", 3)
+    parts: list[Part] = [(0, 0, np.full((HEIGHT, WIDTH, 4), 90 + number), 0, 1) for number in range(4)]
+    numbers = [(0, 0, np.zeros((HEIGHT, WIDTH), int), 0, None)] * 4
+    for count in (3, 4):
+        match kind:
+            case "png":
+                data = encoded(parts[:count])
+            case "gif":
+                data = gif(numbers[:count], np.zeros((8, 3)))
+            case _:
+                data = webp(parts[:count], told=True)
+        (path := tmp_path / f"a.{kind}").write_bytes(data)
+        first = read_picture(path)
+        if count == 3:
+            clip = read_pages(path, first)
+            assert clip is not None
+            assert (clip.frames, first.note) == (3, f"a.{kind}: of its 3 frames only the first is used")
+        else:
+            assert first.note == f"a.{kind}: of its more than 3 frames only the first is used"
+            with pytest.raises(UserError, match=r"^Cannot read .*: it has more than 3 frames; cut it into parts\.$"):
+                read_pages(path, first)
 
 
 def test_a_still_is_no_animation(tmp_path: Path):

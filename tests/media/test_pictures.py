@@ -24,7 +24,7 @@ from PIL.PngImagePlugin import PngInfo
 
 from app.errors import UserError
 from app.media import files
-from app.media.codecs import jpeg
+from app.media.codecs import jpeg, png
 from app.media.codecs.cmyk import cmyk_to_rgb
 from app.media.codecs.exr import read_channels
 from app.media.codecs.metadata import upright_dpi
@@ -1039,15 +1039,31 @@ def test_an_enormous_claim_is_refused_before_decoding(tmp_path: Path):
         read_picture(path)
 
 
+def test_of_a_png_no_more_chunks_are_looked_at_than_a_bound(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    write_picture(tmp_path / "a.png", Picture(smooth(3)))
+    data = (tmp_path / "a.png").read_bytes()
+    count, at = 0, 8
+    while at < len(data):
+        at, count = at + 12 + int.from_bytes(data[at : at + 4], "big"), count + 1
+    monkeypatch.setattr(png, "MOST_CHUNKS", count)
+    assert read_picture(tmp_path / "a.png").width
+    monkeypatch.setattr(png, "MOST_CHUNKS", count - 1)
+    with pytest.raises(UserError, match=rf"a\.png: it has more than {count - 1} chunks; save it anew"):
+        read_picture(tmp_path / "a.png")
+
+
 def test_names_that_cannot_be_written(tmp_path: Path):
     picture = Picture(smooth(3))
     (tmp_path / "folder.png").mkdir()
     (tmp_path / "device.png").symlink_to("/dev/null")
+    (tmp_path / "file").touch()
     for name, message in {
         "a.bmp": "must end in one of .png .jpg",
         "a": "must end in one of",
         "folder.png": "it is a folder",
         "nowhere/a.png": "there is no folder",
+        "file/a.png": "a part of its path is a file; choose another folder",
+        "file/in/a.png": "a part of its path is a file; choose another folder",
         "device.png": "it is not an ordinary file",
     }.items():
         with pytest.raises(UserError, match=message):
@@ -1067,7 +1083,7 @@ def test_names_that_cannot_be_written(tmp_path: Path):
     os.close(writing)
     with pytest.raises(UserError, match="WebP holds no side longer than 16383; make it smaller"):
         write_picture(tmp_path / "a.webp", Picture(np.zeros((1, 17000, 3), np.uint8)))
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["device.png", "folder.png"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["device.png", "file", "folder.png"]
 
 
 @pytest.mark.parametrize("name", ["x.png", "work.fluidwarp"])

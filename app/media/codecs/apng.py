@@ -10,7 +10,7 @@ import zlib
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 
-from app.media.codecs.layered import Animation, Frame
+from app.media.codecs.layered import MOST_FRAMES, Animation, Frame, TooManyFrames
 from app.media.losses import few
 
 SIGNATURE = 8
@@ -20,7 +20,7 @@ HUNDREDTHS = 100  # of a second are the steps of a frame that names none
 
 
 def read(data: bytes) -> Animation | None:
-    """What is in a file; None if it is no animation. Raises `ValueError` if it is damaged."""
+    """What is in a file; None if it is no animation. Raises `ValueError` if it is damaged, and `TooManyFrames`."""
     head, told, kept, frames, control, pieces = b"", (0, 0), [], [], None, list[bytes]()
     for kind, body in _chunks(data):
         match kind:
@@ -31,6 +31,8 @@ def read(data: bytes) -> Animation | None:
             case b"fcTL":
                 if control is not None:
                     frames.append(_frame(control, head, kept, pieces))
+                    if len(frames) == MOST_FRAMES:
+                        raise TooManyFrames
                 control, pieces = body, []
             case b"IDAT" if control is not None:
                 pieces.append(body)

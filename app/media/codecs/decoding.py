@@ -5,9 +5,11 @@ from __future__ import annotations
 import io
 import os
 import sys
+import threading
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager, redirect_stdout
+from contextlib import AbstractContextManager, ExitStack, contextmanager, redirect_stdout
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from app.errors import UserError
@@ -34,19 +36,40 @@ def decoding(file: Path, name: str) -> Iterator[None]:
         raise UserError(message) from error
 
 
-@contextmanager
-def quiet() -> Iterator[None]:
+@dataclass
+class _Quiet:
+    """Nothing reaches the process's output while anybody is within; of several threads the last one out ends that."""
+
+    lock: threading.Lock = field(default_factory=threading.Lock)
+    within: int = 0
+    ended: ExitStack = field(default_factory=ExitStack)
+
+    def __enter__(self) -> None:
+        with self.lock:
+            self.within += 1
+            if self.within > 1:
+                return
+            sys.stderr.flush()
+            kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+            self.ended.callback(os.close, kept)
+            self.ended.callback(os.dup2, kept, 2)
+            os.dup2(nowhere, 2)
+            os.close(nowhere)
+            self.ended.enter_context(redirect_stdout(io.StringIO()))
+
+    def __exit__(self, *exception: object) -> None:
+        with self.lock:
+            self.within -= 1
+            if not self.within:
+                self.ended.close()
+
+
+_QUIET = _Quiet()
+
+
+def quiet() -> AbstractContextManager[None]:
     """Hold back what OpenEXR and libpng print about a damaged file by themselves, where we raise an error of ours."""
-    sys.stderr.flush()
-    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, 2)
-    try:
-        with redirect_stdout(io.StringIO()):
-            yield
-    finally:
-        os.dup2(kept, 2)
-        os.close(kept)
-        os.close(nowhere)
+    return _QUIET
 
 
 def head_of(file: Path) -> bytes:

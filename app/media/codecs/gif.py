@@ -6,20 +6,25 @@ frame that does not say what becomes of it fare as the one before it.
 
 from __future__ import annotations
 
+import re
 import struct
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
 from fractions import Fraction
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
 
 from app.media.codecs import pillow
-from app.media.codecs.layered import BACKGROUND, NONE, PREVIOUS, Animation, Frame
+from app.media.codecs.layered import BACKGROUND, MOST_FRAMES, NONE, PREVIOUS, Animation, Frame, bounded
 from app.media.inputs import read_start
 from app.model.picture import Picture
 
 CONTROL, IMAGE, EXTENSION, END = 0xF9, 0x2C, 0x21, 0x3B
+BLOCK = re.compile(b"[!,;]")  # what starts one
+MOST_EXTENSIONS = 500_000  # of a file: an animation has one a frame
 HEAD = 13  # bytes of the header and the screen
 
 
@@ -27,13 +32,20 @@ def read(file: Path, max_pixels: int) -> Picture:
     """The first frame of a GIF."""
     with pillow.opened("GIF", file, max_pixels) as image:
         left, top, right, bottom = image.tile[0][1]
-        losses = unkept(read_start(file, "picture", HEAD))
+        losses, count = unkept(read_start(file, "picture", HEAD)), _count(file.read_bytes())
         if (left, top, right, bottom) == (0, 0, *image.size):
-            return pillow.picture_of(image, file, losses)
+            return pillow.picture_of(image, file, losses, count=count)
         pixels = np.zeros((image.height, image.width, 4), np.uint8)
         place = slice(top, bottom), slice(left, right)
         pixels[place] = np.asarray(image.convert("RGBA"))[place]
-        return pillow.picture_of(image, file, losses, pixels)
+        return pillow.picture_of(image, file, losses, pixels, count)
+
+
+def _count(data: bytes) -> int:
+    """How many frames there are, or one more than are read; 1 where those after the first are damaged."""
+    with suppress(IndexError, struct.error):
+        return sum(1 for _ in islice(_frames(data, HEAD + len(_table(data, HEAD, data[10])), b""), MOST_FRAMES + 1))
+    return 1
 
 
 def unkept(head: bytes) -> list[str]:
@@ -49,7 +61,7 @@ def frames(data: bytes, loop: int | None) -> Animation | None:
     """
     try:
         table = _table(data, HEAD, data[10])
-        found = list(_frames(data, HEAD + len(table), table))
+        found = bounded(_frames(data, HEAD + len(table), table))
         width, height = struct.unpack_from("<HH", data, 6)
     except (IndexError, struct.error):
         raise ValueError("a frame of it is cut") from None
@@ -78,9 +90,12 @@ def _table(data: bytes, at: int, flags: int) -> bytes:
 
 def _frames(data: bytes, at: int, common: bytes) -> Iterator[Frame]:
     """The frames from a place on; those without a table of their own have the common one."""
-    control, kinds = bytes(4), {2: BACKGROUND, 3: PREVIOUS}
+    control, kinds, extensions = bytes(4), {2: BACKGROUND, 3: PREVIOUS}, 0
     while at < len(data) and data[at] != END:
         if data[at] == EXTENSION:
+            extensions += 1
+            if extensions > MOST_EXTENSIONS:
+                raise ValueError(f"it has more than {MOST_EXTENSIONS} blocks that are no picture")
             if data[at + 1] == CONTROL:
                 control = data[at + 3 : at + 7]
             at = _after_blocks(data, at + 2)
@@ -101,7 +116,8 @@ def _frames(data: bytes, at: int, common: bytes) -> Iterator[Frame]:
             yield Frame(x, y, width, height, seconds, disposal, True, pieces, not has_key, width * height)
             at, control = end, bytes(4)
         else:  # between blocks Pillow passes over what is none
-            at += 1
+            found = BLOCK.search(data, at)
+            at = len(data) if found is None else found.start()
 
 
 def _after_blocks(data: bytes, at: int) -> int:

@@ -1,21 +1,26 @@
-"""Frames that are laid over one another, as those of an animated PNG or GIF."""
+"""Frames that are laid over one another, as those of an animated PNG, GIF or WebP."""
 
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import islice
 from typing import Any
 
 import numpy as np
 
-from app.media.codecs.png import spread_key
+from app.media.codecs.decoding import quiet
 
 NONE, BACKGROUND, PREVIOUS = range(3)  # what becomes of a frame when the next one comes
-PNG_BITS = 24  # the place of the bits a channel in a PNG
+PNG, GIF = b"\x89PNG", b"GIF"  # the start of one
+MOST_FRAMES = 100_000  # of an animation: at 30 a second nearly an hour
 AT_ONCE = 2**20  # pixels that are mixed: in floats they take many times the memory
+
+
+class TooManyFrames(ValueError):
+    """An animation has more than `MOST_FRAMES`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +32,7 @@ class Frame:
         seconds: that it is shown.
         disposal: one of the three above.
         is_over: it is laid over what is there, and does not replace it.
-        pieces: of a file, PNG or GIF, of it alone.
+        pieces: of a file, PNG, GIF or WebP, of it alone.
         is_opaque: nothing of it can be seen through, by the kind of its samples.
         pixels: of that file, which may reach beyond its place.
     """
@@ -52,6 +57,10 @@ class Frame:
         right, bottom = self.x + self.width, self.y + self.height
         beyond = other.x + other.width > right or other.y + other.height > bottom
         return not beyond and other.x >= self.x and other.y >= self.y
+
+    def hides(self, size: tuple[int, int]) -> bool:
+        """Whether nothing can be seen through, wherever in a picture of this size."""
+        return self.is_opaque and (self.width, self.height) == size
 
     @property
     def place(self) -> tuple[slice, slice]:
@@ -92,11 +101,11 @@ class Animation:
                 cleared = None if frame.is_empty else frame
             elif frame.disposal == NONE:
                 cleared = None
-        for frame, part in asked:
-            most -= frame.pixels
-            if not frame.is_empty and (most < 0 or _is_seen_through(frame, part)):
-                return True
-        return False
+        asked = [(frame, part) for frame, part in asked if not frame.is_empty]
+        if sum(frame.pixels for frame, _ in asked) > most:
+            return True
+        with quiet():
+            return any(_is_seen_through(frame, part) for frame, part in asked)
 
     def shown(self) -> Iterator[np.ndarray]:
         """What is seen of each frame in turn, (h, w, 4) uint8; the array is drawn on for the next."""
@@ -105,11 +114,11 @@ class Animation:
             place = canvas[frame.place]
             is_restored = frame.disposal == PREVIOUS and number > 0
             before = place.copy() if is_restored else None
-            drawn = _decoded(frame)
-            band = AT_ONCE // max(frame.width, 1) + 1
-            for rows in (slice(row, row + band) for row in range(0, frame.height, band)):
-                place[rows] = _over(drawn[rows], place[rows]) if frame.is_over else drawn[rows]
-            del drawn
+            for rows, drawn in _decoded(frame):
+                if frame.is_over and not frame.is_opaque:
+                    _lay_over(drawn, place[rows])
+                else:
+                    place[rows] = drawn
             yield canvas
             if before is not None:
                 place[:] = before
@@ -117,62 +126,83 @@ class Animation:
                 place[:] = 0
 
 
-def _decoded(frame: Frame) -> np.ndarray:
-    """The pixels (h, w, 4) of a frame, in 8 bits."""
+def bounded(frames: Iterable[Frame]) -> list[Frame]:
+    """The frames as they come. Raises `TooManyFrames`."""
+    found = list(islice(frames, MOST_FRAMES + 1))
+    if len(found) > MOST_FRAMES:
+        raise TooManyFrames
+    return found
+
+
+def _decoded(frame: Frame) -> Iterator[tuple[slice, np.ndarray]]:
+    """The pixels (h, w, 4) of a frame in 8 bits, some rows after others: all at once take as much memory once more."""
     if frame.is_empty:
-        return np.zeros((frame.height, frame.width, 4), np.uint8)
+        return
+    band = AT_ONCE // frame.width + 1
     file = b"".join(frame.pieces)
-    if _bits(file) == 16:
-        deep = _deep(file)
-        grey, alpha = deep.shape[2] < 3, deep.shape[2] in (2, 4)
-        opaque = deep[..., -1:] if alpha else np.full_like(deep[..., :1], 255)
-        return np.concatenate([deep[..., [0, 0, 0] if grey else [0, 1, 2]], opaque], axis=2)
-    with _opened(file) as image:
-        return np.asarray(image.convert("RGBA"))[: frame.height, : frame.width]
+    image = _image(file) if file.startswith(GIF) else None
+    samples = _samples(file) if image is None else np.empty(0)
+    for rows in (slice(row, min(row + band, frame.height)) for row in range(0, frame.height, band)):
+        if image is None:
+            yield rows, _with_alpha(samples[rows])
+        else:
+            yield rows, np.asarray(image.crop((0, rows.start, frame.width, rows.stop)).convert("RGBA"))
 
 
 def _is_seen_through(frame: Frame, part: tuple[slice, slice]) -> bool:
     """Whether anything of a part of a frame's pixels is; nothing is made of them but this."""
     file = b"".join(frame.pieces)
+    if not file.startswith(GIF):
+        samples = _samples(file)
+        return samples.shape[2] in (2, 4) and bool(samples[part][..., -1].min() < 255)
     rows, columns = (range(length)[one] for length, one in zip((frame.height, frame.width), part, strict=True))
-    if _bits(file) == 16:
-        deep = _deep(file)
-        return deep.shape[2] in (2, 4) and bool(deep[part][..., -1].min() < 255)
-    with _opened(file) as image:
-        image = image.crop((columns.start, rows.start, columns.stop, rows.stop))
-        if image.mode == "P" and isinstance(key := image.info.get("transparency"), int):
-            return image.histogram()[key] > 0
-        if image.mode not in ("LA", "RGBA"):
-            image = image.convert("RGBA")
-        return image.getchannel("A").getextrema()[0] < 255
+    image = _image(file).crop((columns.start, rows.start, columns.stop, rows.stop))
+    if image.mode == "P" and isinstance(key := image.info.get("transparency"), int):
+        return image.histogram()[key] > 0
+    return image.convert("RGBA").getchannel("A").getextrema()[0] < 255
 
 
-def _bits(file: bytes) -> int:
-    return file[PNG_BITS] if file.startswith(b"\x89PNG") else 8
-
-
-def _deep(file: bytes) -> np.ndarray:
-    """The upper 8 of the 16 bits of a PNG, (h, w, channels)."""
-    import imagecodecs
-
-    deep: np.ndarray = imagecodecs.png_decode(file)
-    return (deep[..., None] if deep.ndim == 2 else deep).astype("<u2", copy=False).view(np.uint8)[..., 1::2]
-
-
-@contextmanager
-def _opened(file: bytes) -> Iterator[Any]:
+def _image(file: bytes) -> Any:
+    """Pillow's image of a GIF, which has a byte a pixel."""
     from PIL import Image
 
-    with Image.open(io.BytesIO(file), formats=["PNG", "GIF"]) as image:
-        spread_key(image, _bits(file))
-        yield image
+    return Image.open(io.BytesIO(file), formats=["GIF"])
 
 
-def _over(drawn: np.ndarray, below: np.ndarray) -> np.ndarray:
-    """Straight colours (h, w, 4) over others; what covers all or nothing changes no bit."""
-    own = drawn[..., 3:].astype(np.float32) / 255
-    rest = below[..., 3:].astype(np.float32) / 255 * (1 - own)
+def _samples(file: bytes) -> np.ndarray:
+    """The samples of a PNG or WebP, (h, w, channels), of 16 bits the upper 8, of few bits or a palette spread."""
+    import imagecodecs
+
+    decode = imagecodecs.png_decode if file.startswith(PNG) else imagecodecs.webp_decode
+    with quiet():
+        samples: np.ndarray = decode(file)
+    samples = samples[..., None] if samples.ndim == 2 else samples
+    return samples if samples.dtype == np.uint8 else samples.astype("<u2", copy=False).view(np.uint8)[..., 1::2]
+
+
+def _with_alpha(samples: np.ndarray) -> np.ndarray:
+    """Grey or colours, with alpha or none, as colours with alpha."""
+    channels = samples.shape[2]
+    if channels == 4:
+        return samples
+    colours = samples[..., [0, 0, 0]] if channels < 3 else samples
+    alpha = samples[..., 1:] if channels == 2 else np.full_like(samples[..., :1], 255)
+    return np.concatenate([colours, alpha], axis=2)
+
+
+def _lay_over(drawn: np.ndarray, below: np.ndarray) -> None:
+    """Lay straight colours (h, w, 4) over others; what covers all or nothing changes no bit."""
+    alpha = drawn[..., 3]
+    np.copyto(below, drawn, where=(alpha == 255)[..., None])
+    partly = (alpha > 0) & (alpha < 255)
+    if partly.any():
+        below[partly] = _mixed(drawn[partly], below[partly])
+
+
+def _mixed(drawn: np.ndarray, below: np.ndarray) -> np.ndarray:
+    """What is seen of straight colours (n, 4) over others."""
+    own = drawn[:, 3:].astype(np.float32) / 255
+    rest = below[:, 3:].astype(np.float32) / 255 * (1 - own)
     alpha = own + rest
-    colours = (drawn[..., :3] * own + below[..., :3] * rest) / np.where(alpha > 0, alpha, 1)
-    mixed = (np.concatenate([colours, 255 * alpha], axis=2) + 0.5).astype(np.uint8)
-    return np.where(drawn[..., 3:] == 255, drawn, np.where(drawn[..., 3:] == 0, below, mixed))
+    colours = (drawn[:, :3] * own + below[:, :3] * rest) / alpha
+    return (np.concatenate([colours, 255 * alpha], axis=1) + 0.5).astype(np.uint8)

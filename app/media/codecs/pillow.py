@@ -13,6 +13,7 @@ import numpy as np
 
 from app.errors import UserError
 from app.media.codecs.cmyk import cmyk_to_rgb
+from app.media.codecs.layered import MOST_FRAMES
 from app.media.codecs.metadata import ORIENTATION, sized_exif, told_dpi, upright, upright_dpi, upright_exif, upright_xmp
 from app.media.inputs import check_size
 from app.media.losses import lost
@@ -51,10 +52,13 @@ def too_large(file: Path, max_pixels: int) -> UserError:
     return UserError(f"Cannot read {file}: a frame of it has more than the limit of {max_pixels} pixels; get it again.")
 
 
-def picture_of(image: Any, file: Path, losses: list[str], pixels: np.ndarray | None = None) -> Picture:
+def picture_of(
+    image: Any, file: Path, losses: list[str], pixels: np.ndarray | None = None, count: int | None = None
+) -> Picture:
     """The picture that `image` is, with these `pixels` if they are given, and what belongs to it.
 
     losses: what is known to be lost of the file; what else is goes to their end.
+    count: of the frames in the file, for which Pillow else is asked.
     """
     from PIL import ExifTags, Image
 
@@ -83,9 +87,10 @@ def picture_of(image: Any, file: Path, losses: list[str], pixels: np.ndarray | N
         texts["Comment"] = comment.decode("utf-8", "replace")
     xmp = image.info.get("xmp")
     with suppress(Exception):  # those after the first may be damaged
-        if (count := getattr(image, "n_frames", 1)) > 1:
+        if (there := count or getattr(image, "n_frames", 1)) > 1:
             frames = "pictures" if image.format in ("JPEG", "MPO") else "frames"
-            losses.append(f"of its {count} {frames} only the first is used")
+            told = there if there <= MOST_FRAMES else f"more than {MOST_FRAMES}"
+            losses.append(f"of its {told} {frames} only the first is used")
     return Picture(
         upright(pixels if pixels.ndim == 3 else pixels[..., None], orientation),
         icc=icc,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 import struct
 from collections import Counter
 from collections.abc import Mapping
@@ -13,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from app.errors import UserError
 from app.media.codecs import ZLIB_LEVEL, pillow
 from app.media.codecs.decoding import quiet
 from app.media.codecs.metadata import sized_exif
@@ -26,6 +28,7 @@ TEXT_CHUNKS = (b"tEXt", b"zTXt", b"iTXt")
 LONGEST_KEYWORD = 79
 XMP_NAME = "XML:com.adobe.xmp"
 EMPTY = {b"tEXt": range(2), b"zTXt": range(10, 11), b"iTXt": range(5, 14)}  # bytes after the name of a text of nothing
+MOST_CHUNKS = 500_000  # of a file: those of an animation are two or more a frame
 MOST_HEADER = 300  # bytes that a text's name, compression and language are looked for in
 # What is kept otherwise, is made anew (tIME, iDOT, hIST), or is of frames that are told themselves.
 UNDERSTOOD = {
@@ -37,6 +40,7 @@ USUAL_GAMMA = range(45000, 46000)  # 1 / 2.2, as sRGB has it on the whole
 
 def read(file: Path, max_pixels: int) -> Picture:
     """Read a PNG in its depth."""
+    _check_chunks(file)
     with pillow.opened("PNG", file, max_pixels) as image:
         chunks, unkept = _chunks(file, image)
         colours = unusual(chunks, image.info.get("icc_profile") is not None)
@@ -53,6 +57,18 @@ def read(file: Path, max_pixels: int) -> Picture:
             with quiet():
                 pixels = imagecodecs.png_decode(file.read_bytes())  # Pillow gives 8 bits of 16 without a word
         return replace(pillow.picture_of(image, file, losses, pixels), chunks=chunks)
+
+
+def _check_chunks(file: Path) -> None:
+    """Raise `UserError` of a file with more chunks than can be looked at in some seconds."""
+    with file.open("rb") as stream:
+        stream.seek(8)
+        for _ in range(MOST_CHUNKS):
+            head = stream.read(8)
+            if len(head) < 8 or head[4:] == b"IEND":
+                return
+            stream.seek(int.from_bytes(head[:4], "big") + 4, os.SEEK_CUR)
+    raise UserError(f"Cannot read {file}: it has more than {MOST_CHUNKS} chunks; save it anew with another program.")
 
 
 def spread_key(image: Any, bits: int) -> None:
