@@ -380,9 +380,9 @@ class Handles:
 
         "outside": nothing of it lies in the picture. "waiting": it has not begun. "over": its end has come. "edge": its
         goal is farther than it goes beside the picture's edge. "strain": the map around it slows it down so far
-        that it would let go by that alone. It has let go: "at odds" where another in force lies within both reaches,
-        "soft" where it leads with less than all its stiffness, else "alone". "under way": its goal is. "late": that
-        rests, and it comes nearer.
+        that it would let go by that alone, or has let go by that. It has let go: "at odds" where another in force
+        lies within both reaches, "soft" where it leads with less than all its stiffness, else "alone". "under way":
+        its goal is. "late": that rests, and it comes nearer.
         """
         found = list[str | None]()
         if not self._shapes:
@@ -396,7 +396,7 @@ class Handles:
         near, time, lefts = 1 / max(self._warp.size), self._fluid.time, self.left(math.inf, 1.0)
         held = np.repeat([handle.end >= time for handle in self.handles], self._counts)
         held &= np.isfinite(self._starts[:, 0])
-        for shape, rows, (_, waited), (_, left) in zip(self._shapes, self._rows, self._progress, lefts, strict=True):
+        for shape, rows, (_, waited), (due, left) in zip(self._shapes, self._rows, self._progress, lefts, strict=True):
             starts = self._starts[rows]
             if not shape.is_in_picture:
                 found.append("outside")
@@ -407,11 +407,14 @@ class Handles:
             elif shape.short_of_edges(starts) > FOUND:
                 found.append("edge")
             else:
-                is_strained = slower[rows].min() * RATE * PATIENCE < math.log(2)  # (H1): no half in that time
-                if is_strained:
+                pace, least = float(slower[rows].min()), math.log(2) / RATE / PATIENCE  # (H1): half in that time
+                firm = pace if np.abs(due - starts).max() > FOUND else 1.0  # what is led lets go as it goes slower
+                if pace < least:
                     found.append("strain")
                 elif waited <= PATIENCE:
                     found.append("under way" if time < shape.handle.last else "late" if left > near else None)
+                elif pace * (1 - (1 - firm) ** 2) < least:  # it has its push before the step and once more after it
+                    found.append("strain")
                 elif _are_near(places, self._radii, rows, held):
                     found.append("at odds")
                 else:
