@@ -431,15 +431,15 @@ class WarpMap:
         """The whole map's displacement on `size` texels (width, height), by default the accumulated map's.
 
         Valid until the map changes, and to be looked up between its texels by the cubic; unless `exact`, so is the
-        accumulated map for it. `regions`: of these texels, where alone it is wanted.
+        accumulated map for it. `regions`: of these texels, where alone it is wanted; the others hold anything.
         """
         size = self.size if size is None else size
         is_alone = self._steps == 0 and self._remapping.is_idle and not self._accumulated.closed
         if size == self.size and is_alone and self._frozen.held is None:
             return self._accumulated.now
         key = size, exact
-        if key not in self._composed:
-            self._composed[key] = self.device.field(size, 2, f"warp map at {size[0]} x {size[1]}")
+        if key not in self._composed:  # of regions the rest is never touched: of a large picture that is most of it
+            self._composed[key] = Field(self.device, size, 2, f"warp map at {size[0]} x {size[1]}", cleared=False)
         if key not in self._fresh:
             field = self._composed[key]
             self._compose(field, (0.0, 0.0), field.texel, regions, **({} if exact else {"CUBIC": 1}))
