@@ -53,7 +53,7 @@ class ForwardMap:
         points = places(points)
         near = self._near(points)
         self._find_guess(near if 2 * near[..., 0].size < self._guess.width * self._guess.height else None)
-        boxes = None if self._warp.at_rest else self._boxes(points, near)
+        boxes = None if self._warp.at_rest is not None else self._boxes(points, near)
         if boxes is None:
             return self._inverted(points, self._warp.composed(exact=True))
         found = np.empty((len(points), 2), np.float32)
