@@ -19,6 +19,7 @@ from app.media.outlines import SPACING, paired
 
 MOST_BYTES = 2**20
 FARTHEST = 1e6  # pixels: nobody's landmark lies beyond
+TINY = 4  # pixels along a side: in a smaller picture what lies within one may be meant
 ENDINGS = (".csv", ".pts", ".tps")
 
 COLUMNS = "x0", "y0", "x1", "y1"
@@ -56,17 +57,21 @@ def read_pairs(paths: Sequence[Path], size: Size) -> Pairs:
     is the custom, so that (1, 1) is the middle of the first; .tps counts y from the picture's lower edge.
 
     Raises:
-        UserError: naming the file and the line, or if they are not two sets of as many landmarks.
+        UserError: naming the file and the line, if they are not two sets of as many landmarks, or if all
+            of them lie within a pixel of where it counts from, as fractions would.
     """
     files, has = " and ".join(str(path) for path in paths), "has" if len(paths) == 1 else "have"
     if len(paths) == 1 and check_ending(paths[0]) == ".csv":
         pixels, curves = _read_csv(paths[0], _lines(paths[0]), SPACING * max(size))
         if not len(pixels):
             raise UserError(f"{files} has no pairs")
+        _check_spread(files, [pixels], size)
         return Pairs(pixels / size, curves)
-    sets: list[np.ndarray] = []
+    sets, counted = list[np.ndarray](), list[np.ndarray]()
     for path in paths:
-        sets += _read(path, size)
+        found = _read(path, size)
+        sets += found
+        counted += [points - _origin(path, size) for points in found]
     if len(sets) != 2:
         found = f"{len(sets)} sets of landmarks" if len(sets) != 1 else "one set of landmarks"
         said = f"{files} {has} {found}; pairs need two, where the points are and where they should be"
@@ -75,6 +80,7 @@ def read_pairs(paths: Sequence[Path], size: Size) -> Pairs:
         raise UserError(f"{files}: {len(sets[0])} landmarks cannot be paired with {len(sets[1])}")
     if not len(sets[0]):
         raise UserError(f"{files} {has} no pairs")
+    _check_spread(files, counted, size)
     return Pairs.points(np.stack(sets, axis=1) / size)
 
 
@@ -131,6 +137,19 @@ def _read(path: Path, size: Size) -> list[np.ndarray]:
             return [_read_pts(path, _lines(path)) - 0.5]
         case _:
             return [points * (1, -1) + (0, size[1]) for points in _read_tps(path, _lines(path))]
+
+
+def _origin(path: Path, size: Size) -> tuple[float, float]:
+    """Where a file counts its pixels from, in pixels from the top-left corner."""
+    return {".pts": (-0.5, -0.5), ".tps": (0.0, float(size[1]))}.get(check_ending(path), (0.0, 0.0))
+
+
+def _check_spread(files: str, counted: list[np.ndarray], size: Size) -> None:
+    """Raise `UserError` if all places, (..., 2) from where a file counts, are so near that they may be fractions."""
+    if min(size) > TINY and all((np.abs(places) <= 1).all() for places in counted):
+        width, height = size
+        said = "all of it lies within one pixel of the corner, as fractions of the picture would"
+        raise UserError(f"{files}: {said}; pairs are in pixels, so multiply x by {width} and y by {height}")
 
 
 def _lines(path: Path) -> Lines:

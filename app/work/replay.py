@@ -28,7 +28,7 @@ from app.work.checkpoints import DEFAULT_BUDGET, Checkpoint, Checkpoints, Moment
 from app.work.loaded_forces import LoadedForce, acting
 from app.work.loaded_handles import LoadedHandles
 from solver.brush.handle import Handle
-from solver.brush.handles import Handles
+from solver.brush.handles import Begun, Handles
 from solver.brush.masks import Masks
 from solver.fluid import Fluid
 from solver.gl.device import Device
@@ -276,7 +276,7 @@ class Replay:
                 self._change(change)
         leads = any(led.is_in_force(self.tick, dt) for _, led in self.led)
         acts = [act for stroke in self.recipe.stroke for act in stroke.acts(self.tick)]
-        self._follow([act for act in acts if act.stroke.tool in FLOWING], leads)
+        begun = self._follow([act for act in acts if act.stroke.tool in FLOWING], leads)
         self._set_parameters(self.settings)
         scene, brushwork, painted = self._scene(part), self._brushwork, False
         brushwork.begin()
@@ -286,7 +286,7 @@ class Replay:
             if painted:
                 self._apply_masks()
             if leads:
-                self.handles.lead(dt, self.tick * dt)
+                self.handles.lead(dt, self.tick * dt, begun)
 
         def steer(velocity: Field) -> None:
             with self.device.stage("brush"):
@@ -336,10 +336,15 @@ class Replay:
             self._use_viscosity(settings.viscosity)
             self._apply_masks()
 
-    def _follow(self, acts: list[Act], leads: bool) -> None:
-        """Let the flow be solved where strokes and handles of this tick want it; without any it stays where it is."""
+    def _follow(self, acts: list[Act], leads: bool) -> Begun | None:
+        """Let the flow be solved where strokes and handles of this tick want it; without any it stays where it is.
+
+        Returns what `Handles.lead` need not look for again.
+        """
+        begun = None
         if (acts or leads) and self._has_windows:
-            window = FlowWindow.of(acts, self.window, self.grid, self._ways() if leads else [])
+            led, begun = self._ways() if leads else ([], None)
+            window = FlowWindow.of(acts, self.window, self.grid, led)
             if window != self.window:
                 assert isinstance(self.fluid, Fluid)
                 with self.device.stage("window"):
@@ -351,16 +356,18 @@ class Replay:
                     self._apply_masks()
                     self.fluid.go_on_with(flow)
                     flow.release()
+        return begun
 
-    def _ways(self) -> list[Led]:
-        """The handles and pins that are in force in this tick."""
+    def _ways(self) -> tuple[list[Led], Begun | None]:
+        """The handles and pins that are in force in this tick, and what `Handles.lead` need not look for again."""
         if not all(led.detail for _, led in self.led if led.is_in_force(self.tick, self.recipe.fluid.dt)):
-            return [WHOLE]
+            return [WHOLE], None
         dt, found = self.recipe.fluid.dt, list[Led]()
-        for number, here, then, is_moving, begins, is_late in self.handles.ways(self.tick * dt, dt):
+        ways, begun = self.handles.ways(self.tick * dt, dt)
+        for number, here, then, is_moving, begins, is_late in ways:
             (_, led), handle = self.led[number], self.handles.handles[number]
             found.append(Led(led.detail, handle.reach, handle.push_radius, here, then, is_moving, begins, is_late))
-        return found
+        return found, begun
 
     def _cells_of(self, window: FlowWindow | None) -> Grid:
         return self.grid if window is None else window.grid_in(self.grid)

@@ -1,12 +1,14 @@
 // Invert: F(y) = x - y with x + D(x) = y, by Newton's method from a guess.
-// u_displacement (D), u_guess (F): longer sides, over the same domain; u_extent: its width and height, longer sides;
-// y: see lib/place.glsl.
+// u_displacement (D), u_guess (F): longer sides, over the same domain; u_extent: its width and height, longer sides; u_size:
+// the texels of D over all of it, u_corner: the first of them that is given; y: see lib/place.glsl.
 // reads: 257
 #include "lib/displacement.glsl"
 #include "lib/place.glsl"
 uniform sampler2D u_displacement;
 uniform sampler2D u_guess;
 uniform vec2 u_extent;
+uniform vec2 u_size;
+uniform vec2 u_corner;
 layout(location = 0) out vec2 out_displacement;
 
 const int ROUNDS = 16;
@@ -14,13 +16,13 @@ const float ROUNDING = 1e-7;  // longer sides, of a place in float32
 
 void main() {
     float farthest = length(u_extent / vec2(textureSize(u_guess, 0))) * 0.70710678;  // that one round may go: as the guess is apart
-    vec2 place = fragment_place(), density = vec2(textureSize(u_displacement, 0)) / u_extent;
+    vec2 place = fragment_place(), density = u_size / u_extent;
     vec2 target = place * u_extent, found = texture(u_guess, place).rg, best = found;
     float least = 1e30;
     for (int round = 0; round < ROUNDS; ++round) {
         mat2 slope;
         // What is left over, without the rounding of the places themselves.
-        vec2 rest = found + cubic_displacement(u_displacement, (target + found) * density, vec4(0.0), slope);
+        vec2 rest = found + cubic_displacement(u_displacement, (target + found) * density - u_corner, vec4(0.0), slope);
         float error = dot(rest, rest);
         best = error < least ? found : best;
         least = min(error, least);

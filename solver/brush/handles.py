@@ -95,6 +95,20 @@ class Way(NamedTuple):
     is_late: bool
 
 
+class Begun(NamedTuple):
+    """Where points begin that have not begun yet, found before the step in which they do.
+
+    Attributes:
+        leads: of the map that they were found by.
+        rows: which of all points they are, (n,).
+        places: where they are, (k, 2).
+    """
+
+    leads: int
+    rows: np.ndarray
+    places: np.ndarray
+
+
 class Targets(NamedTuple):
     """Where the points of active handles are and where they shall be in a step.
 
@@ -171,9 +185,6 @@ class Handles:
         self._counts = np.zeros(0, int)
         self._lead: Lead | None = None  # of the present step
         self._sought: tuple[object, np.ndarray] | None = None  # where they are, and what that was found from
-        # Of the map as it leads, these points and where they are: it is laid on a window before they are led, and would
-        # have to be drawn and inverted again.
-        self._begins: tuple[int, np.ndarray, np.ndarray] | None = None
         self.replace(handles)
 
     def replace(self, handles: Iterable[Handle]) -> None:
@@ -196,7 +207,6 @@ class Handles:
         self._soft = 1 / self._stiffness - 1 + ridges
         self._places, self._starts = (self._fitted(kept, before) for kept in (self._places, self._starts))
         self._progress = self._fitted_progress(self._progress)
-        self._begins = None
 
     def go_on_with(self, fluid: Scheme) -> None:
         """From now on, move another fluid of the same picture: what lies outside its window stays by itself."""
@@ -216,17 +226,20 @@ class Handles:
         self.follow(self._fluid, dt)
         self._warp.follow(self._fluid, dt)  # pyright: ignore[reportArgumentType]
 
-    def lead(self, dt: float, time: float) -> None:
-        """Before a step at a time: find where the handles are and shall go, and add what the fluid lacks of that."""
+    def lead(self, dt: float, time: float, known: Begun | None = None) -> None:
+        """Before a step at a time: find where the handles are and shall go, and add what the fluid lacks of that.
+
+        `known`: what `ways` of the same step found.
+        """
         if (dt := check_step(dt)) < NO_TIME:
             raise ValueError("to lead a handle takes some time")
         self._lead = None
         begun, in_force = self._in_force(time, dt)
         self._places = self._located()
         if (new := np.repeat(begun, self._counts) & np.isnan(self._starts[:, 0])).any():
-            known, self._begins = self._begins, None
-            is_known = known is not None and known[0] == self._warp.leads and np.array_equal(known[1], new)
-            self._starts[new] = self._places[new] = known[2] if known is not None and is_known else self._where(new)
+            if known is None or known.leads != self._warp.leads or not np.array_equal(known.rows, new):
+                known = self._begun(new)
+            self._starts[new] = self._places[new] = known.places
         in_force &= self._have_room()
         active, listed = np.flatnonzero(in_force).tolist(), np.flatnonzero(np.repeat(in_force, self._counts))
         if not active:
@@ -293,15 +306,18 @@ class Handles:
         )
         self._fluid.impulse.add(lambda faces: self._push(lead, faces, lead.wanted))
 
-    def ways(self, time: float, dt: float) -> list[Way]:
-        """Before a step at a time, of all that are in force in it; `lead` need not look for these again."""
+    def ways(self, time: float, dt: float) -> tuple[list[Way], Begun | None]:
+        """Before a step at a time, of all that are in force in it; and for `lead` what begins, if something does.
+
+        That holds for the map as it leads, also on another window: it would have to be drawn and inverted again there.
+        """
         begun, in_force = self._in_force(time, dt)
         if not in_force.any():
-            return []
-        places, starts, near = self._located(), self._starts.copy(), 1 / max(self._warp.size)
+            return [], None
+        known, places, starts, near = None, self._located(), self._starts.copy(), 1 / max(self._warp.size)
         if (new := np.repeat(begun, self._counts) & np.isnan(starts[:, 0])).any():
-            starts[new] = places[new] = self._where(new)
-            self._begins = self._warp.leads, new, places[new]
+            known = self._begun(new)
+            starts[new] = places[new] = known.places
         has_ended = any(abs(handle.last - time) <= dt / 2 for handle in self.handles)
         found = list[Way]()
         for number in np.flatnonzero(in_force).tolist():
@@ -313,7 +329,7 @@ class Handles:
             is_away = waits and float(np.hypot(*(then - here).T).max()) > near
             is_begun = not (was_led and np.isfinite(self._starts[rows]).all())
             found.append(Way(number, here, then, bool(is_led or is_away), bool(is_led and is_begun), not is_led))
-        return found
+        return found, known
 
     def make_up(self, velocity: Field) -> None:
         """After viscosity, before the projection: add to a velocity on MAC faces what is still lacking.
@@ -380,9 +396,9 @@ class Handles:
 
         "outside": nothing of it lies in the picture. "waiting": it has not begun. "over": its end has come. "edge": its
         goal is farther than it goes beside the picture's edge. "strain": the map around it slows it down so far
-        that it would let go by that alone. It has let go: "at odds" where another in force lies within both reaches,
-        "soft" where it leads with less than all its stiffness, else "alone". "under way": its goal is. "late": that
-        rests, and it comes nearer.
+        that it would let go by that alone, or has let go by that. It has let go: "at odds" where another in force
+        lies within both reaches, "soft" where it leads with less than all its stiffness, else "alone". "under way":
+        its goal is. "late": that rests, and it comes nearer.
         """
         found = list[str | None]()
         if not self._shapes:
@@ -396,7 +412,7 @@ class Handles:
         near, time, lefts = 1 / max(self._warp.size), self._fluid.time, self.left(math.inf, 1.0)
         held = np.repeat([handle.end >= time for handle in self.handles], self._counts)
         held &= np.isfinite(self._starts[:, 0])
-        for shape, rows, (_, waited), (_, left) in zip(self._shapes, self._rows, self._progress, lefts, strict=True):
+        for shape, rows, (_, waited), (due, left) in zip(self._shapes, self._rows, self._progress, lefts, strict=True):
             starts = self._starts[rows]
             if not shape.is_in_picture:
                 found.append("outside")
@@ -407,11 +423,14 @@ class Handles:
             elif shape.short_of_edges(starts) > FOUND:
                 found.append("edge")
             else:
-                is_strained = slower[rows].min() * RATE * PATIENCE < math.log(2)  # (H1): no half in that time
-                if is_strained:
+                pace, least = float(slower[rows].min()), math.log(2) / RATE / PATIENCE  # (H1): half in that time
+                firm = pace if np.abs(due - starts).max() > FOUND else 1.0  # what is led lets go as it goes slower
+                if pace < least:
                     found.append("strain")
                 elif waited <= PATIENCE:
                     found.append("under way" if time < shape.handle.last else "late" if left > near else None)
+                elif pace * (1 - (1 - firm) ** 2) < least:  # it has its push before the step and once more after it
+                    found.append("strain")
                 elif _are_near(places, self._radii, rows, held):
                     found.append("at odds")
                 else:
@@ -461,7 +480,7 @@ class Handles:
             raise ValueError("the state of handles is missing")
         self._progress = self._fitted_progress(progress)
         self._expected.restore(state.fields.get(EXPECTED))
-        self._lead = self._begins = None
+        self._lead = None
 
     def release(self) -> None:
         """Free the textures."""
@@ -531,6 +550,10 @@ class Handles:
             best[lost] = wanted[lost] + self._forward.at(wanted[lost])
         places[begun] = best
         return places
+
+    def _begun(self, rows: np.ndarray) -> Begun:
+        """These points (n,), which begin now."""
+        return Begun(self._warp.leads, rows, self._where(rows))
 
     def _where(self, listed: np.ndarray) -> np.ndarray:
         """Where these points (n,) of the original are, (k, 2)."""

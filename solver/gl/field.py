@@ -31,8 +31,8 @@ class Field:
         components: 1-4.
         label: its name in errors and in a frame debugger.
         dtype: "f4" (float32), "f1" and "nu2" (8 and 16 bits, read as 0-1), "u4" (whole numbers) or "f2".
-        cleared: it holds zeros; else nothing that may be read before it has been written or drawn as a whole, which
-            saves a draw.
+        cleared: it holds zeros; else nothing of it may be read that has not been written or drawn, which saves a
+            draw.
     """
 
     def __init__(

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from solver.gl.passes import Region
+from solver.gl.field import Field
 from solver.gl.points import draw_at
 from solver.limits import places
 from solver.warp.map import WarpMap
@@ -15,6 +15,7 @@ from solver.warp.scaled import ScaledMap
 
 MOST_ALONG = 1024  # texels along a side of the first guess
 ROUNDS = 16  # of Newton's method, in warp/invert.frag
+Box = tuple[int, int, int, int]  # left, top, right, bottom, in texels
 AROUND = 4  # texels that the cubic reads around a place, and more for what is rounded
 
 
@@ -42,7 +43,7 @@ class ForwardMap:
         field = self._warp.device.field(size, 2, "forward map, to read")
         invert = self._warp.device.pass_("warp/invert.frag")
         self._find_guess()
-        invert(field, **self._inputs(), origin=(0.0, 0.0), step=field.texel)
+        invert(field, **self._inputs(self._warp.composed(exact=True)), origin=(0.0, 0.0), step=field.texel)
         displacement = field.get()
         field.release()
         return displacement
@@ -52,8 +53,18 @@ class ForwardMap:
         points = places(points)
         near = self._near(points)
         self._find_guess(near if 2 * near[..., 0].size < self._guess.width * self._guess.height else None)
-        inputs = self._inputs(self._regions(points, near))
-        return draw_at(self._warp.device, points, self._warp.extent, "warp/invert.frag", **inputs)
+        boxes = None if self._warp.at_rest is not None else self._boxes(points, near)
+        if boxes is None:
+            return self._inverted(points, self._warp.composed(exact=True))
+        found = np.empty((len(points), 2), np.float32)
+        texel = 1 / self._warp.size[0], 1 / self._warp.size[1]
+        for (left, top, right, bottom), members in _apart(boxes):
+            # All of a large picture's map is large: to make room for it takes longer than everything else.
+            part = Field(self._warp.device, (right - left, bottom - top), 2, "a part of the warp map", cleared=False)
+            self._warp.draw(part, (left, top), texel, exact=True)
+            found[members] = self._inverted(points[members], part, (left, top))
+            part.release()
+        return found
 
     def release(self) -> None:
         """Free the texture."""
@@ -65,9 +76,13 @@ class ForwardMap:
     def __exit__(self, *_: object) -> None:
         self.release()
 
-    def _inputs(self, regions: list[Region] | None = None) -> dict[str, Any]:
-        displacement = self._warp.composed(exact=True, regions=regions)
-        return {"displacement": displacement, "guess": self._guess, "extent": self._warp.extent}
+    def _inverted(self, points: np.ndarray, displacement: Field, corner: tuple[int, int] = (0, 0)) -> np.ndarray:
+        inputs = self._inputs(displacement, corner)
+        return draw_at(self._warp.device, points, self._warp.extent, "warp/invert.frag", **inputs)
+
+    def _inputs(self, displacement: Field, corner: tuple[int, int] = (0, 0)) -> dict[str, Any]:
+        inputs: dict[str, Any] = {"displacement": displacement, "guess": self._guess, "extent": self._warp.extent}
+        return inputs | {"corner": corner, "size": self._warp.size}
 
     def _near(self, points: np.ndarray) -> np.ndarray:
         """Texels of the guess that points lie between, and one more each way as it may be rounded: (n, 16, 2)."""
@@ -119,8 +134,8 @@ class ForwardMap:
         for run in np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1) if len(numbers) else ():
             yield int(run[0]), len(run)
 
-    def _regions(self, points: np.ndarray, near: np.ndarray) -> list[Region] | None:
-        """The texels of the map among which Newton's method finds these points; None if they may be half of it."""
+    def _boxes(self, points: np.ndarray, near: np.ndarray) -> list[Box] | None:
+        """The texels of the map among which Newton's method finds each of these points; None if they are half of it."""
         extent, size, guesses = np.array(self._warp.extent), np.array(self._warp.size), np.array(self._guess.size)
         reach = ROUNDS * np.sqrt(0.5) * np.hypot(*(extent / guesses))  # no round goes farther
         least = 2 * np.ceil(reach / extent * size) + 2 * AROUND
@@ -134,9 +149,25 @@ class ForwardMap:
         low, high = np.clip(low, 0, size), np.clip(high, 0, size)
         if 2 * np.prod(high - low, axis=1).sum() >= np.prod(size):
             return None
-        return [
-            (x, y, right - x, bottom - y) for (x, y), (right, bottom) in zip(low.tolist(), high.tolist(), strict=True)
-        ]
+        return [(left, top, right, bottom) for left, top, right, bottom in np.hstack([low, high]).tolist()]
+
+
+def _apart(boxes: list[Box]) -> list[tuple[Box, list[int]]]:
+    """These boxes, those that meet as one around them, each with their numbers."""
+    groups = list[tuple[Box, list[int]]]()
+    for number, box in enumerate(boxes):
+        members = [number]
+        while met := [group for group in groups if _meet(group[0], box)]:
+            groups = [group for group in groups if not _meet(group[0], box)]
+            left, top, right, bottom = zip(box, *(other for other, _ in met), strict=True)
+            box = min(left), min(top), max(right), max(bottom)
+            members += [each for _, numbers in met for each in numbers]
+        groups.append((box, members))
+    return groups
+
+
+def _meet(one: Box, other: Box) -> bool:
+    return all(one[k] < other[k + 2] and other[k] < one[k + 2] for k in (0, 1))
 
 
 def _bounded(size: tuple[int, int]) -> tuple[int, int]:

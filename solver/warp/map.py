@@ -425,26 +425,28 @@ class WarpMap:
 
     # -- reading it -------------------------------------------------------------------------------------------------
 
-    def composed(
-        self, size: tuple[int, int] | None = None, exact: bool = False, regions: list[Region] | None = None
-    ) -> Field:
+    @property
+    def at_rest(self) -> Field | None:
+        """The accumulated map, as long as that is all of the map; else None."""
+        is_alone = self._steps == 0 and self._remapping.is_idle and not self._accumulated.closed
+        return self._accumulated.now if is_alone and self._frozen.held is None else None
+
+    def composed(self, size: tuple[int, int] | None = None, exact: bool = False) -> Field:
         """The whole map's displacement on `size` texels (width, height), by default the accumulated map's.
 
         Valid until the map changes, and to be looked up between its texels by the cubic; unless `exact`, so is the
-        accumulated map for it. `regions`: of these texels, where alone it is wanted.
+        accumulated map for it.
         """
         size = self.size if size is None else size
-        is_alone = self._steps == 0 and self._remapping.is_idle and not self._accumulated.closed
-        if size == self.size and is_alone and self._frozen.held is None:
-            return self._accumulated.now
+        if size == self.size and (known := self.at_rest) is not None:
+            return known
         key = size, exact
         if key not in self._composed:
-            self._composed[key] = self.device.field(size, 2, f"warp map at {size[0]} x {size[1]}")
+            self._composed[key] = Field(self.device, size, 2, f"warp map at {size[0]} x {size[1]}", cleared=False)
         if key not in self._fresh:
             field = self._composed[key]
-            self._compose(field, (0.0, 0.0), field.texel, regions, **({} if exact else {"CUBIC": 1}))
-            if regions is None:
-                self._fresh.add(key)
+            self._compose(field, (0.0, 0.0), field.texel, **({} if exact else {"CUBIC": 1}))
+            self._fresh.add(key)
         return self._composed[key]
 
     def size_for(self, picture: tuple[int, int], result: tuple[int, int]) -> tuple[int, int]:

@@ -60,18 +60,21 @@ class Remapping:
     def advance(self, grid: Grid) -> None:
         """Go on by one step; `grid` is the submap's."""
         if self._pending is not None:
-            # A level gathered on another grid has to be finished before the submap on this one needs a remap.
-            waits = self._gathered is not None and self._gathered.grid != grid
+            # What is gathered on another grid is to be pending before the submap on this one needs a remap.
+            gathered, pending = self._gathered, self._pending
+            waits = gathered is not None and gathered.grid != grid and not _are_alike(gathered, pending)
             self._done += self._whole // REMAP_STEPS if waits else REMAP_STEPS
             self._take_in(min(self._done / self._whole, 1.0))
 
     def give(self, submap: Submap, is_weighed: bool) -> None:
         """Take over what a submap holds, weighted or not, and empty it."""
-        gathered = self._gathered
-        if gathered is not None and (gathered.grid, gathered.images) != (submap.grid, submap.images):
-            self.finish()
-        elif self._tiles * (1 - self._done / self._whole) <= FEW_TILES:
+        if self._tiles * (1 - self._done / self._whole) <= FEW_TILES:
             self._take_in(1.0)
+        while self._gathered is not None and not _are_alike(self._gathered, submap):
+            if self._pending is not None and _are_alike(self._gathered, self._pending):
+                self._join()
+            else:
+                self._take_in(1.0)  # then what is gathered is pending
         if self._pending is not None:
             self._gather(submap, is_weighed)
         elif self._stand_by(Level(submap.read, submap.grid, is_weighed, submap.images)):
@@ -159,6 +162,15 @@ class Remapping:
         if before is not None:
             before.field.release()
 
+    def _join(self) -> None:
+        """Make what is gathered and what is pending, on one grid, a single pending level, taken in from its start."""
+        levels, self._gathered, self._pending = self.levels, None, None
+        joined = self._resampled(levels)
+        for level in levels:
+            level.field.release()
+        if not self._stand_by(joined):
+            joined.field.release()
+
     def _resampled(self, levels: list[Level]) -> Level:
         """The composition of levels of one grid, with several texels a cell."""
         grid, (most, in_all) = levels[0].grid, MOST_GATHERED
@@ -214,3 +226,8 @@ class Remapping:
     def _whole(self) -> int:
         """`REMAP_STEPS` times the steps that the pending level is taken in over, if nothing waits."""
         return REMAP_STEPS * max(REMAP_STEPS, math.ceil(self._tiles / MOST_TILES))
+
+
+def _are_alike(one: Level | Submap, other: Level | Submap) -> bool:
+    """True if they can be composed into one level."""
+    return (one.grid, one.images) == (other.grid, other.images)

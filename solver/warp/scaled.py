@@ -64,13 +64,16 @@ class ScaledMap:
         """As `WarpMap.size_for`."""
         return self.warp.size_for(picture, result)
 
-    def composed(
-        self, size: tuple[int, int] | None = None, exact: bool = False, regions: list[Region] | None = None
-    ) -> Field:
-        """As `WarpMap.composed`; at another amount than 1 everywhere."""
+    @property
+    def at_rest(self) -> Field | None:
+        """As `WarpMap.at_rest`."""
+        return self.warp.at_rest if self.amount == 1 else None
+
+    def composed(self, size: tuple[int, int] | None = None, exact: bool = False) -> Field:
+        """As `WarpMap.composed`."""
         size = self.size if size is None else size
         if self.amount == 1:
-            return self.warp.composed(size, exact, regions)
+            return self.warp.composed(size, exact)
         field = self._fields.get("composed", size, 2)
         if self._drawn != (made := (self.version, size, exact)):
             self._draw(field, (0.0, 0.0), field.texel, exact)
@@ -82,11 +85,12 @@ class ScaledMap:
         target: Field,
         origin: tuple[float, float],
         step: tuple[float, float],
+        exact: bool = False,
         coarsely: bool = False,
         regions: list[Region] | None = None,
     ) -> None:
         """As `WarpMap.draw`."""
-        self._draw(target, origin, step, exact=False, coarsely=coarsely, regions=regions)
+        self._draw(target, origin, step, exact, coarsely, regions)
 
     def read(self, size: tuple[int, int] | None = None) -> np.ndarray:
         """As `WarpMap.read`."""

@@ -48,6 +48,26 @@ def test_csv_of_other_programs_is_read(tmp_path: Path, text: str) -> None:
     np.testing.assert_allclose(read_pairs([tmp_path / "a.csv"], SIZE).places[0] * SIZE, [(10, 20), (30, 40.5)])
 
 
+FRACTIONS = {
+    "a.csv": ("x0,y0,x1,y1\n.5,.5,.6,.4\n.2,1,.2,0\n",),
+    "a.pts": ("n_points: 1\n{\n.5 .5\n}\n", "n_points: 1\n{\n1 .4\n}\n"),
+    "a.tps": ("LM=2\n.5 .5\n.1 1\nLM=2\n.5 .4\n.3 0\n",),
+}
+
+
+@pytest.mark.parametrize("name", FRACTIONS)
+def test_fractions_are_not_taken_for_pixels(tmp_path: Path, name: str) -> None:
+    """They all lay in the first pixel, and nothing told why no handle went anywhere."""
+    files = [tmp_path / f"{number}{name}" for number, _ in enumerate(FRACTIONS[name])]
+    for path, text in zip(files, FRACTIONS[name], strict=True):
+        path.write_text(text)
+    with pytest.raises(UserError, match=r"within one pixel of the corner.* multiply x by 200 and y by 100$"):
+        read_pairs(files, SIZE)
+    assert read_pairs(files, (4, 4)).places.max() <= 1
+    files[-1].write_text(files[-1].read_text().replace(".4", "1.4"))
+    assert len(read_pairs(files, SIZE).places)
+
+
 @pytest.mark.parametrize("encoding", ["utf-16-le", "utf-16-be"])
 def test_text_of_two_bytes_a_letter_is_read_by_its_mark(tmp_path: Path, encoding: str) -> None:
     """As Excel's "Unicode Text" is; without the mark nothing tells it from damage."""

@@ -24,7 +24,7 @@ from solver.warp.factors import Factors
 from solver.warp.frozen import FADED, Frozen
 from solver.warp.inverse import ForwardMap
 from solver.warp.map import WarpMap
-from solver.warp.remapping import MOST_TILES, REMAP_STEPS
+from solver.warp.remapping import FEW_TILES, MOST_TILES, REMAP_STEPS
 from solver.warp.state import MOST_CLOSED
 from solver.warp.submap import Level
 from support import reference
@@ -520,21 +520,21 @@ def test_forward_map_of_a_few_points_needs_a_part_of_the_map_only(
         warp.advance_prescribed(vortex, 1 / 60, step / 60)
     points = np.vstack([rng.uniform((-0.1, -0.1), (1.1, 0.9), (24, 2)), [(0.0, 0.0), (1.0, 0.75), (0.5, 0.375)]])
     forward = ForwardMap(warp)
-    drawn, few = list[float](), []
-    composed = WarpMap.composed
+    drawn, few, draw = list[float](), [], WarpMap.draw
 
-    def note(warp: WarpMap, size: Any = None, exact: bool = False, regions: Any = None) -> Field:
-        if exact:
-            drawn.append(1.0 if regions is None else sum(x * y for *_, x, y in regions) / np.prod(warp.size))
-        return composed(warp, size, exact, regions)
+    def note(self: WarpMap, target: Field, *args: Any, **more: Any) -> None:
+        drawn.append(np.prod(target.size) / np.prod(self.size))
+        target.clear(np.nan, np.nan)
+        draw(self, target, *args, **more)
 
-    monkeypatch.setattr(WarpMap, "composed", note)
+    monkeypatch.setattr(WarpMap, "draw", note)
     for each in np.array_split(points, 9):
         few.append(forward.at(each))
-    assert max(drawn) < 0.5
+        assert 0 < sum(drawn) < 0.5
+        drawn.clear()
     many = np.tile(points, (40, 1))
     np.testing.assert_array_equal(np.concatenate(few), forward.at(many)[: len(points)])
-    assert drawn[-1] == 1
+    assert not drawn
     forward.release()
     warp.release()
 
@@ -1342,6 +1342,39 @@ def test_a_large_map_is_made_anew_a_little_in_each_step(device: Device) -> None:
     assert warp.statistics().folds == 0
     warp.remap()
     np.testing.assert_allclose(warp.read((100, 100)), found, atol=5e-4 * whole.h, err_msg="resampled on the way")
+
+
+def test_a_remap_soon_after_a_move_to_another_grid_finishes_no_more_than_it_must(device: Device) -> None:
+    """What waits on one grid becomes one level, begun anew; of two grids the lower one is finished, and no more."""
+    whole = Grid(32, 32)
+    grids = [whole, window(whole.refined(2), 8, 8, 40, 40), window(whole.refined(2), 10, 12, 40, 40)]
+    warp, at_once = (WarpMap(device, whole, (2560, 2560), remap_every=2) for _ in range(2))
+    drawn = list[list[float]]()
+    for grid, steps in zip(grids, (6, 4, 4), strict=True):
+        warp.move_to(grid)
+        at_once.move_to(grid)
+        drawn.append([])
+        for step in range(steps):
+            device.timings.take()
+            with device.stage("step"):
+                warp.advance_prescribed(swirl((0.45, 0.45), 0.28), 0.03)
+            drawn[-1].append(device.timings.texel_writes["step"] / TILE**2)
+            at_once.advance_prescribed(swirl((0.45, 0.45), 0.28), 0.03)
+            if step % 2:
+                at_once.remap()
+    tiles = 49  # that the swirl reaches
+    hurry = 2 * -(-tiles // REMAP_STEPS) + 5  # each of them drawn and copied, and what is gathered
+    assert max(drawn[0] + drawn[1]) < 2 * (MOST_TILES + FEW_TILES) + 2
+    assert max(drawn[2]) < tiles, "what is left of one level of two"
+    assert sorted(drawn[2])[-2] < hurry
+    state = warp.save()
+    assert {"gathered", "pending"} <= state.fields.keys()
+    state.release()
+    found = at_once.read((100, 100))
+    assert np.abs(found).max() > 1.5 * whole.h
+    assert np.abs(warp.read((100, 100)) - found).max() < 2e-3 * whole.h
+    warp.release()
+    at_once.release()
 
 
 def test_where_nothing_moves_a_remap_draws_and_copies_nothing(device: Device) -> None:
