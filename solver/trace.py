@@ -37,7 +37,7 @@ class Trace:
     def __init__(self, device: Device, size: tuple[int, int]) -> None:
         self.device = device
         self.field = device.field(size, 2, "trace")
-        self._steepness = Steepness(device, size, "trace")
+        self._steepness = Steepness(device, size, "trace", FACES=1)
         self._dt: float | None = None  # the step that it is of
 
     def is_of(self, dt: float) -> bool:

@@ -174,7 +174,7 @@ class BrushPath(Model):
             return 0.0
         number = bisect_left(self.samples, (tick,)) - 1
         last = self._interpolated(min(tick - 1, self.last_tick))
-        return _lengths(_Path(self.samples), extent)[number] + _apart(self.samples[number], last, extent)
+        return _lengths(_Path(self.samples), extent)[number] + _distance(self.samples[number], last, extent)
 
     def _interpolated(self, tick: int) -> tuple[int, float, float, float]:
         """Where the pointer was at the end of `tick`, which lies between the first and the last."""
@@ -363,10 +363,10 @@ class _Path:
 @lru_cache(64)
 def _lengths(path: _Path, extent: tuple[float, float]) -> list[float]:
     """Of a path up to each of its samples: once for all ticks, or a long stroke would take the square of its length."""
-    return list(accumulate((_apart(a, b, extent) for a, b in pairwise(path.samples)), initial=0.0))
+    return list(accumulate((_distance(a, b, extent) for a, b in pairwise(path.samples)), initial=0.0))
 
 
-def _apart(a: Sample, b: Sample, extent: tuple[float, float]) -> float:
+def _distance(a: Sample, b: Sample, extent: tuple[float, float]) -> float:
     return hypot((b[1] - a[1]) * extent[0], (b[2] - a[2]) * extent[1])
 
 

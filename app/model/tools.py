@@ -291,12 +291,12 @@ def _drawn(press: Press, first: Touch) -> Generator[None, Touch | None, list[Tou
     touches, tick = [first], first.tick
     while (touch := (yield None)) is not None:
         tick = touch.tick
-        if _apart(press, touches[-1], touch) > DRAWN:
+        if _distance(press, touches[-1], touch) > DRAWN:
             touches.append(touch)
     return [*touches[:-1], touches[-1]._replace(tick=tick)]
 
 
-def _apart(press: Press, one: Touch, other: Touch) -> float:
+def _distance(press: Press, one: Touch, other: Touch) -> float:
     """How far two touches are apart, in longer sides."""
     return hypot((one.x - other.x) * press.extent[0], (one.y - other.y) * press.extent[1])
 
@@ -312,12 +312,12 @@ def _lead(press: Press, first: Touch) -> Gesture:
         touches = yield from _drawn(press, first)
         if len(touches) < 2:
             return None
-        length = sum(_apart(press, one, other) for one, other in pairwise(touches))
+        length = sum(_distance(press, one, other) for one, other in pairwise(touches))
         corners = [(touch.x, touch.y) for touch in touches[:: ceil(len(touches) / MOST_CORNERS)]]
         points = tuple(press.under(corners))
         if (different := len(set(points))) < 2:
             return None
-        closed = different > 2 and _apart(press, touches[0], touches[-1]) < CLOSED * length
+        closed = different > 2 and _distance(press, touches[0], touches[-1]) < CLOSED * length
         return _held(press, touches[-1].tick, points=points, closed=closed)
     if handle is None:
         handle = _held(press, first.tick, at=press.at)

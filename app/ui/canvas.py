@@ -216,9 +216,9 @@ class Canvas:
             self._texture.filter = moderngl.LINEAR_MIPMAP_NEAREST, moderngl.LINEAR
             inputs |= {"picture": self._texture, "displacement": displacement}
             layer, level = self._fields.get("thumbnail", target.size, 4, "f1"), _halvings(width / self._texture.width)
-            apart = self._apart(inputs["step"], level)
+            spacing = self._spacing(inputs["step"], level)
             averaged = self.device.pass_("view/picture.frag", EDGES=edges)
-            averaged.draw_into(layer.framebuffer, ("displacement",), **inputs, level=float(level), apart=apart)
+            averaged.draw_into(layer.framebuffer, ("displacement",), **inputs, level=float(level), spacing=spacing)
             defines["SEEN"] = 1
             inputs |= {"seen": layer, "corner": (0.0, 0.0)}
         self.device.pass_("view/canvas.frag", **defines).draw_into(target, ("displacement",), **inputs)
@@ -281,23 +281,23 @@ class Canvas:
             return *self._last, None
         (left, top, right, bottom), rect, density = seen, viewport.drawn, viewport.density
 
-        def lattice(apart: int) -> Lattice:
+        def lattice(stride: int) -> Lattice:
             # One more on every side, to be interpolated between.
             return Lattice(
-                (-(-(right - left) // apart) + 2, -(-(bottom - top) // apart) + 2),
-                ((left - rect.x * density) / apart - 1, (top - rect.y * density) / apart - 1),
-                (apart / (rect.width * density), apart / (rect.height * density)),
+                (-(-(right - left) // stride) + 2, -(-(bottom - top) // stride) + 2),
+                ((left - rect.x * density) / stride - 1, (top - rect.y * density) / stride - 1),
+                (stride / (rect.width * density), stride / (rect.height * density)),
             )
 
         # Of a picture that is magnified, as far apart as what is exported of it is found too.
         whole = ceil(rect.width * density), ceil(rect.height * density)
-        apart = max(1, whole[0] // warp.size_for(self.size, whole)[0])
+        stride = max(1, whole[0] // warp.size_for(self.size, whole)[0])
         if not (session.is_moving or state.is_scaling):
-            at_rest = lattice(apart)
-            if (picture := self._picture(session, at_rest, apart, seen, inputs, level, is_on_target)) is not None:
+            at_rest = lattice(stride)
+            if (picture := self._picture(session, at_rest, stride, seen, inputs, level, is_on_target)) is not None:
                 self._last = self._fields["displacement"], at_rest.shown
                 return *self._last, picture
-        moving = lattice(max(apart, MOVING))
+        moving = lattice(max(stride, MOVING))
         field = self._fields.get("displacement, moving", moving.size, 2)
         if (drawn := (field, warp, warp.version, moving)) != self._drawn:
             warp.draw(field, moving.origin, moving.step, coarsely=True)
@@ -309,7 +309,7 @@ class Canvas:
         self,
         session: Session,
         lattice: Lattice,
-        apart: int,
+        stride: int,
         seen: Pixels,
         inputs: dict[str, Any],
         level: int,
@@ -318,7 +318,7 @@ class Canvas:
         """The picture at the pixels that are `seen` as an export has it; None until the last part has been drawn.
 
         Args:
-            lattice: of the displacement for it, `apart` pixels from one texel to the next.
+            lattice: of the displacement for it, `stride` pixels from one texel to the next.
             level: how often the picture is halved.
             is_on_target: the target has some of them; else they are not drawn.
         """
@@ -326,7 +326,7 @@ class Canvas:
         height, step = bottom - top, inputs["step"]
         numbers: dict[str, Any] = {"shown": lattice.shown, "step": step, "extent": inputs["extent"]}
         numbers |= {"origin": (inputs["origin"][0] - left, inputs["origin"][1] - top), "level": float(level)}
-        numbers |= {"apart": self._apart(step, level), "target_height": float(height)}
+        numbers |= {"spacing": self._spacing(step, level), "target_height": float(height)}
         warp, edges = session.seen, EDGES[session.recipe.edges]
         displacement = self._fields.get("displacement", lattice.size, 2)
         layer = self._fields.get("picture", (right - left, height), 4, "f1")
@@ -338,7 +338,7 @@ class Canvas:
         elif self.is_unfinished:
             strips = [(first, min(first + ROWS, height)) for first in range(self._parts * ROWS, height, PARTS * ROWS)]
             # Of the displacement a strip takes what lies beside its pixels too, to be interpolated between.
-            rows = [(start // apart, -(-end // apart) + 2) for start, end in strips]
+            rows = [(start // stride, -(-end // stride) + 2) for start, end in strips]
             regions = [(0, first, lattice.size[0], end - first) for first, end in rows]
             warp.draw(displacement, lattice.origin, lattice.step, regions=regions)
             displacement.texture.filter = moderngl.LINEAR, moderngl.LINEAR
@@ -352,7 +352,7 @@ class Canvas:
             self._parts += 1
         return None if self.is_unfinished else layer
 
-    def _apart(self, step: tuple[float, float], level: int) -> tuple[float, ...]:
+    def _spacing(self, step: tuple[float, float], level: int) -> tuple[float, ...]:
         """How far apart samples of the picture, so often halved, may be, 0-1 of it, for pixels a `step` apart."""
         return tuple(max(2**level / side, one) for side, one in zip(self._texture.size, step, strict=True))
 

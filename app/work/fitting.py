@@ -476,10 +476,10 @@ class _Search:
         self.numbers = self._usable(base)
         self.fine = _Stage(base, pictures, A_FINE_ONE)
         self.hopeful = self._reachable()
-        apart = -(-self.longer // COARSE_PICTURE)
-        small = replace(picture, pixels=np.ascontiguousarray(picture.pixels[::apart, ::apart]))
+        stride = -(-self.longer // COARSE_PICTURE)
+        small = replace(picture, pixels=np.ascontiguousarray(picture.pixels[::stride, ::stride]))
         coarse = _Stage(_coarse(base), Pictures(small, pictures.folder, pictures.clip, pictures.label))
-        if apart == 1 and coarse.recipe == base:
+        if stride == 1 and coarse.recipe == base:
             self.fine = coarse
         self.coarse = coarse
         self._tried: dict[tuple[bool, bytes], Trial] = {}

@@ -2,7 +2,7 @@
 // that it pushes at or from, so that it comes to rest there smoothly.
 // u_motion: the fluid at each image, from probe; u_slip: from slip, in row u_row; v_vector: the local part of its
 // velocity, lengths / s; u_viscosity: cells, lengths^2 / s: what is thicker than at the brush is carried less.
-// With SOLIDS: u_apart, cells, lengths to what is closed: within the radius all is carried less, beside it by the square of
+// With SOLIDS: u_distance, cells, lengths to what is closed: within the radius all is carried less, beside it by the square of
 // that. What is local knows no pressure, so in proportion to it all would be pressed together, or drawn out, exponentially
 // with the way; and along it, held by nothing, be sheared within a cell.
 // vertices: lib/images.vert
@@ -18,7 +18,7 @@ flat in vec2 v_vector;
 flat in int v_number;
 flat in float v_share;
 #ifdef SOLIDS
-uniform sampler2D u_apart;
+uniform sampler2D u_distance;
 #endif
 layout(location = 0) out vec2 out_velocity;
 
@@ -33,8 +33,8 @@ void main() {
     ivec2 image = ivec2(v_number, 0);
     vec2 attenuation = min(max(texelFetch(u_motion, image, 0).w, 1e-9) / thickest, 1.0);
 #ifdef SOLIDS
-    vec2 apart = texture(u_apart, uv).r + vec2(texture(u_apart, left).r, texture(u_apart, above).r);
-    weight *= smoothstep(0.0, u_radius, 0.5 * apart);
+    vec2 both = texture(u_distance, uv).r + vec2(texture(u_distance, left).r, texture(u_distance, above).r);
+    weight *= smoothstep(0.0, u_radius, 0.5 * both);
 #endif
     float slip = texelFetch(u_slip, image + ivec2(0, int(u_row)), 0).r;
     out_velocity = slip * v_share * attenuation * max(weight, 0.0) * v_vector

@@ -1,12 +1,12 @@
 // Handle carry: the local part of handles' motions, each b V and nothing beside it, out of a list and drawn with additive
 // blending; less its image beyond a wall that it pushes at or from, and with SOLIDS less beside what is closed, as carry.frag.
-// v_brush, v_vector (V): see lib/listed.vert; u_apart: cells, lengths to what is closed.
+// v_brush, v_vector (V): see lib/listed.vert; u_distance: cells, lengths to what is closed.
 // vertices: lib/listed.vert
 // reads: 0, and 3 with SOLIDS
 flat in vec4 v_brush;
 flat in vec4 v_vector;
 #ifdef SOLIDS
-uniform sampler2D u_apart;
+uniform sampler2D u_distance;
 #endif
 uniform vec2 u_texels;
 layout(location = 0) out vec2 out_velocity;
@@ -24,8 +24,8 @@ void main() {
                      weight(v) - weight(vec2(v.x, -v.y)) - weight(vec2(v.x, far.y - v.y)));
 #ifdef SOLIDS
     vec2 texel = 1.0 / u_texels, uv = p * texel, left = uv - vec2(texel.x, 0.0), above = uv - vec2(0.0, texel.y);
-    vec2 apart = texture(u_apart, uv).r + vec2(texture(u_apart, left).r, texture(u_apart, above).r);
-    part *= smoothstep(0.0, v_brush.z, 0.5 * apart);
+    vec2 both = texture(u_distance, uv).r + vec2(texture(u_distance, left).r, texture(u_distance, above).r);
+    part *= smoothstep(0.0, v_brush.z, 0.5 * both);
 #endif
     out_velocity = max(part, 0.0) * v_vector.xy * vec2(greaterThan(p, vec2(1.0)));
 }

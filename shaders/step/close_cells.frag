@@ -10,8 +10,8 @@ uniform float u_solid;
 uniform float u_reach;
 layout(location = 0) out float out_solid;
 
-// Squared distance of the middle of a cell from a box, in cells.
-float apart(vec2 middle, vec2 low, vec2 high) {
+// Of the middle of a cell from a box, cells^2.
+float squared_distance(vec2 middle, vec2 low, vec2 high) {
     vec2 far = max(max(low - middle, middle - high), 0.0);
     return dot(far, far);
 }
@@ -27,9 +27,9 @@ void main() {
             ivec2 at = ivec2(other);
             if (at != clamp(at, ivec2(0), cells - 1)) continue;
             float covered = texelFetch(u_covered, at, 0).r;
-            if (covered == 0.0 || apart(middle, other, other + 1.0) >= far) continue;
+            if (covered == 0.0 || squared_distance(middle, other, other + 1.0) >= far) continue;
             if (covered == 1.0) {
-                far = min(far, apart(middle, other, other + 1.0));
+                far = min(far, squared_distance(middle, other, other + 1.0));
                 continue;
             }
             Texels texels = texels_under(other, canvas);
@@ -38,7 +38,7 @@ void main() {
                 for (corner.x = texels.first.x; corner.x < texels.high.x; corner.x += texels.block.x)
                     if (texelFetch(u_frozen, block_texel(texels, corner), 0).r >= 0.5) {
                         vec2 low = max(corner, texels.low) - texels.low, high = min(corner + texels.block, texels.high) - texels.low;
-                        far = min(far, apart(middle, other + low * cells_a_texel, other + high * cells_a_texel));
+                        far = min(far, squared_distance(middle, other + low * cells_a_texel, other + high * cells_a_texel));
                     }
         }
     out_solid = clamp(u_solid + 1.0 - sqrt(far), 0.0, 1.0);

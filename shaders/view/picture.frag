@@ -1,8 +1,8 @@
 // Picture: what the canvas shows of a picture at rest, through the warp map: the mean of samples spread evenly over each
 // pixel of the screen, as an export has them, so that no texel is passed over where the map presses the picture together.
 //   colour(x) = mean of picture(y + D(y)),  y in the pixel at x; origin, step, shown, extent, D and EDGES: see canvas.frag
-// Along x and along y there are so many that none are farther apart than u_apart (0-1 of the picture): texels, or where the
-// picture is seen smaller what lies between two pixels; a quarter more is not to be seen.
+// Along x and along y there are so many that none are farther apart than u_spacing (0-1 of the picture): texels, or where
+// the picture is seen smaller what lies between two pixels; a quarter more is not to be seen.
 // Several are added up in linear light. u_picture: premultiplied, sRGB, its version of half so many texels a side u_level times.
 // reads: 6, and 2 more for each sample above 1 where the picture is pressed
 #include "lib/beyond.glsl"
@@ -13,7 +13,7 @@ uniform vec2 u_origin;
 uniform vec2 u_step;
 uniform vec4 u_shown;
 uniform vec2 u_extent;
-uniform vec2 u_apart;
+uniform vec2 u_spacing;
 uniform float u_level;
 uniform float u_target_height;
 layout(location = 0) out vec4 out_colour;
@@ -38,8 +38,8 @@ void main() {
     vec2 pixel = vec2(gl_FragCoord.x, u_target_height - gl_FragCoord.y) - u_origin;
     vec2 a = place_at(pixel + vec2(-0.5, -0.5)), b = place_at(pixel + vec2(0.5, -0.5));
     vec2 c = place_at(pixel + vec2(-0.5, 0.5)), d = place_at(pixel + vec2(0.5, 0.5));
-    vec2 side = vec2(max(length((b - a) / u_apart), length((d - c) / u_apart)),
-                     max(length((c - a) / u_apart), length((d - b) / u_apart)));
+    vec2 side = vec2(max(length((b - a) / u_spacing), length((d - c) / u_spacing)),
+                     max(length((c - a) / u_spacing), length((d - b) / u_spacing)));
     vec2 count = clamp(ceil(side - 0.25), 1.0, MOST);
     if (count == vec2(1.0)) {
         out_colour = look_up(place_at(pixel));

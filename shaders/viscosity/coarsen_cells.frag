@@ -51,13 +51,13 @@ void read_live(bool turned) {
     }
 }
 
-void read_fine(sampler2D fine_k, int apart, bool turned) {
+void read_fine(sampler2D fine_k, int offset, bool turned) {
     for (int q = 0; q < 8; ++q) {
         vec4 cells = turn(fine(fine_k, fine_texel() + turn(ivec2(q % 2, q / 2 - 1), turned)), turned);
         vec2 sums = cells.xz + cells.yw;
         int row = 2 * (q / 2) - 1;
-        if (row >= 0) k[6 * apart + row][q % 2] = sums.x;
-        if (row < 5) k[6 * apart + row + 1][q % 2] = sums.y;
+        if (row >= 0) k[6 * offset + row][q % 2] = sums.x;
+        if (row < 5) k[6 * offset + row + 1][q % 2] = sums.y;
     }
 }
 
@@ -67,24 +67,24 @@ vec2 weight(int row, int place) {
     return mix(vec2(1.0), vec2(place == 0 || place == 1 ? 0.75 : 0.25), other);
 }
 
-// K of a coarse row, the texel's first or second, with the one `apart` rows further.
-vec2 coarse(int row, int apart) {
+// K of a coarse row, the texel's first or second, with the one `offset` rows further.
+vec2 coarse(int row, int offset) {
     vec2 total = vec2(0.0);
     for (int place = -1; place < 3; ++place)
         for (int other = -1; other < 3; ++other) {
-            int away = other + 2 * apart - place;
+            int away = other + 2 * offset - place;
             if (abs(away) <= FARTHEST)
-                total += weight(row, place) * weight(row + apart, other) * k[6 * abs(away) + 1 + 2 * row + place + min(away, 0)];
+                total += weight(row, place) * weight(row + offset, other) * k[6 * abs(away) + 1 + 2 * row + place + min(away, 0)];
         }
     return total * u_alone.x * u_alone.y / 16.0;
 }
 
-vec4 coarse(int apart, bool turned) {
+vec4 coarse(int offset, bool turned) {
     // Rows beyond the grid are none.
     ivec2 first = 2 * turn(ivec2(own_texel()), turned), end = turn(textureSize(u_xx0, 0) - 2, turned);
-    bvec2 here = lessThan(ivec2(first.y, first.y + 1), end.yy), there = lessThan(ivec2(first.y, first.y + 1) + apart, end.yy);
+    bvec2 here = lessThan(ivec2(first.y, first.y + 1), end.yy), there = lessThan(ivec2(first.y, first.y + 1) + offset, end.yy);
     bvec2 across = lessThan(ivec2(first.x, first.x + 1), end.xx);
-    vec2 upper = here.x && there.x ? coarse(0, apart) : vec2(0.0), lower = here.y && there.y ? coarse(1, apart) : vec2(0.0);
+    vec2 upper = here.x && there.x ? coarse(0, offset) : vec2(0.0), lower = here.y && there.y ? coarse(1, offset) : vec2(0.0);
     return turn(vec4(upper, lower) * vec2(across).xyxy, turned);
 }
 

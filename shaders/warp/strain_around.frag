@@ -25,8 +25,8 @@ vec4 at(float column, float row) {
 // The square of how many times farther apart two places lie, the one in front `back` from the other.
 float stretch(vec2 place, vec2 back, vec2 moved) {
     if (any(lessThan(place, back))) return 0.0;
-    vec2 apart = min((place + 0.5) * u_step, u_last) - min((place + 0.5 - back) * u_step, u_last);
-    return dot(apart + moved, apart + moved) / max(dot(apart, apart), 1e-20);
+    vec2 way = min((place + 0.5) * u_step, u_last) - min((place + 0.5 - back) * u_step, u_last);
+    return dot(way + moved, way + moved) / max(dot(way, way), 1e-20);
 }
 
 void main() {

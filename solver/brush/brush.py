@@ -75,7 +75,7 @@ class Brush:
         if not push.local:
             return
         self._look(fluid, push, fluid.faces(), warp)
-        solids: dict[str, Any] = {"apart": self._distance.of(fluid)} if fluid.has_solids else {}
+        solids: dict[str, Any] = {"distance": self._distance.of(fluid)} if fluid.has_solids else {}
         carry = self.device.pass_("brush/carry.frag", **({"SOLIDS": 1} if solids else {}))
         inputs = {"motion": self._motion, "viscosity": fluid.viscosity, **solids} | self._slip.inputs()
         inputs["hardness"] = push.local_hardness

@@ -283,8 +283,8 @@ class Handles:
             local_parts = local_parts * self._probed(looked_at, self._fluid.faces())[pushed, 2]
             local, part = pushes.local_influence(places)[:, :, : len(pushed)], local_parts[:, None]
             if self._fluid.has_solids:
-                apart = self._distance.at(self._fluid, places)
-                local *= _smoothstep(apart[:, None] / radii[pushed])[:, None, :, None]
+                distance = self._distance.at(self._fluid, places)
+                local *= _smoothstep(distance[:, None] / radii[pushed])[:, None, :, None]
             both = _matrix(((1 - part) * push[:, :, : len(pushed)] + part * local)[pushed])
             carried = part * solved(both, soft, wanted[pushed].ravel()).reshape(-1, 2)
             moved = np.einsum("iajb,jb->ia", local, carried)
@@ -346,7 +346,7 @@ class Handles:
         fluid, lead, self._lead = self._fluid, self._lead, None  # of many points it is large
         if lead is None or not lead.local.any():
             return
-        solids: dict[str, Any] = {"apart": self._distance.of(fluid)} if fluid.has_solids else {}
+        solids: dict[str, Any] = {"distance": self._distance.of(fluid)} if fluid.has_solids else {}
         carry = fluid.device.pass_("brush/handle_carry.frag", **({"SOLIDS": 1} if solids else {}))
         self._expected.begin()
         listed = lead.places[lead.pushed], lead.radii[lead.pushed], lead.local
@@ -524,8 +524,8 @@ class Handles:
         """How far places (n, 2) are from the sides of the fluid's window within the picture; negative outside."""
         grid = self._fluid.grid
         low, high = places - grid.origin, np.add(grid.origin, grid.extent) - places
-        apart = np.stack([low[:, 0], high[:, 0], low[:, 1], high[:, 1]], axis=-1)
-        return np.where(grid.at_edge, np.inf, apart).min(axis=1)
+        distances = np.stack([low[:, 0], high[:, 0], low[:, 1], high[:, 1]], axis=-1)
+        return np.where(grid.at_edge, np.inf, distances).min(axis=1)
 
     def _have_room(self) -> np.ndarray:
         """The handles, (h,), whose pushes all lie in the fluid's window: nothing else in it is led."""

@@ -174,10 +174,10 @@ def _faded(held: np.ndarray) -> np.ndarray:
     box = tuple(slice(max(at[0] - FADED, 0), at[-1] + FADED + 1) for at in (rows, columns))
     near = np.minimum(held[box], 127)
     for along in (near, near.T):
-        for apart in (1, 2, 4, 8, 16):  # which add up to each distance up to `FADED`
-            less = np.maximum(along, apart) - apart
-            np.maximum(along[apart:], less[:-apart], out=along[apart:])
-            np.maximum(along[:-apart], less[apart:], out=along[:-apart])
+        for step in (1, 2, 4, 8, 16):  # which add up to each distance up to `FADED`
+            less = np.maximum(along, step) - step
+            np.maximum(along[step:], less[:-step], out=along[step:])
+            np.maximum(along[:-step], less[step:], out=along[:-step])
     faded[box] = np.maximum(held[box], near)
     return faded
 

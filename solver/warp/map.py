@@ -583,8 +583,8 @@ class WarpMap:
         """
         if size is None:
             width, height = self.size
-            apart = math.ceil(math.sqrt(width * height / MOST_PLACES))
-            size = -(-width // apart), -(-height // apart)
+            stride = math.ceil(math.sqrt(width * height / MOST_PLACES))
+            size = -(-width // stride), -(-height // stride)
         return distortion(self.device, size, self._held_defines(), self._parts())
 
     # -- its parts --------------------------------------------------------------------------------------------------

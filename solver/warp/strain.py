@@ -101,8 +101,8 @@ class Strain:
             found = read().astype(np.float64).reshape(*close.shape[:-1], 4)
             original, most = close + found[..., :2], np.zeros(len(places))
             for axis in (1, 2):
-                apart, far = (np.hypot(*np.moveaxis(np.diff(each, axis=axis), -1, 0)) for each in (original, close))
-                ratio = np.where(far > 1e-6, apart / np.maximum(far, 1e-6), 0.0)
+                before, after = (np.hypot(*np.moveaxis(np.diff(each, axis=axis), -1, 0)) for each in (original, close))
+                ratio = np.where(after > 1e-6, before / np.maximum(after, 1e-6), 0.0)
                 most = np.maximum(most, ratio.max(axis=(1, 2)))
             bent = found[..., 2:].min(axis=-1)
             if expected is not None:

@@ -175,7 +175,7 @@ def test_a_pixel_at_rest_is_the_mean_of_what_is_under_it_along_each_side(
         extent=(1.0, 1.0),
         origin=(0.0, 0.0),
         step=(1 / SIDE, 1 / SIDE),
-        apart=(1 / columns, 1 / rows),
+        spacing=(1 / columns, 1 / rows),
         level=0.0,
         target_height=float(SIDE),
     )
