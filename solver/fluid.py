@@ -209,7 +209,8 @@ class Fluid(Scheme):
         return tracing
 
     def _begin_own_trace(self, dt: float) -> Tracing | None:
-        return None if self._trace.is_of(dt) else self._trace.begin(self.faces(), dt, self.grid, self.params.walls)
+        walls = self.params.walls
+        return None if self._trace.is_of(dt, walls) else self._trace.begin(self.faces(), dt, self.grid, walls)
 
     # -- what is put in ---------------------------------------------------------------------------------------------
 

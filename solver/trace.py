@@ -28,7 +28,7 @@ class Tracing:
 
 
 class Trace:
-    """x_d - x at cell centres, in cells (S3): drawn once for a velocity and a step, by the first that needs it.
+    """x_d - x at cell centres, in cells (S3): drawn once for a velocity, a step and walls, by the first that needs it.
 
     Attributes:
         field: the texture.
@@ -38,11 +38,11 @@ class Trace:
         self.device = device
         self.field = device.field(size, 2, "trace")
         self._steepness = Steepness(device, size, "trace", FACES=1)
-        self._dt: float | None = None  # the step that it is of
+        self._drawn: tuple[float, Walls] | None = None  # the step and the walls that it is of
 
-    def is_of(self, dt: float) -> bool:
-        """True if it is drawn for this step, and the velocity has not changed since."""
-        return self._dt == dt
+    def is_of(self, dt: float, walls: Walls) -> bool:
+        """True if it is drawn for this step between these walls, and the velocity has not changed since."""
+        return self._drawn == (dt, walls)
 
     def begin(self, velocity: Field, dt: float, grid: Grid, walls: Walls, in_parts: bool = False) -> Tracing:
         """What it takes to draw the trace of a velocity on MAC faces for `dt`; it counts as drawn until `forget`.
@@ -57,7 +57,7 @@ class Trace:
                 raise ValueError("the motion that carries the picture is too fast")
             defines = defines | {"PARTS": 1}
             inputs["parts"] = float(min(max(math.ceil(strain / STRAIN), 1), MOST_PARTS))
-        self._dt = dt
+        self._drawn = dt, walls
         return Tracing(self.field, defines, inputs)
 
     def strain(self, velocity: Field, dt: float, grid: Grid) -> float:
@@ -66,7 +66,7 @@ class Trace:
 
     def forget(self) -> None:
         """Say that the velocity has changed."""
-        self._dt = None
+        self._drawn = None
 
     def release(self) -> None:
         for thing in (self.field, self._steepness):

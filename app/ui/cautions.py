@@ -66,6 +66,8 @@ class Cautions:
             # Where Restore has made the fold, more of it need not help.
             restored = session.document.history.undo_name == TOOL["restore"].label
             mend = "Undo" if restored else "Undo, or Restore it there"
+            if session.replay.recipe.amount != 1 and not session.replay.warp.statistics().folds:
+                mend = "Set Amount to 100 %, where it does not"
             self._messages.caution(
                 f"The warp folds over itself in {folds} of {places} places. {mend}.",
                 lambda: session is self._workspace.session and self._folds,

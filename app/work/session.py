@@ -81,15 +81,16 @@ class Session(Playing):
 
     @property
     def folds(self) -> tuple[int, int]:
-        """In how many places the warp folds over itself at this moment, and of how many, two a cell along each axis.
+        """In how many places the warp folds over itself as it is seen at this moment, and of how many, two a cell along
+        each axis.
 
         Reads back from the GPU; an export, which may take longer, looks at more of them.
         """
-        warp = self.replay.warp
-        if warp.is_untouched:
+        seen = self.replay.seen
+        if seen.is_untouched:
             return 0, 0
-        width, height = warp.coarse_size
-        found = self._once("folds", (warp, warp.version), lambda: warp.statistics((2 * width, 2 * height)))
+        width, height = seen.coarse_size
+        found = self._once("folds", (seen, seen.version), lambda: seen.statistics((2 * width, 2 * height)))
         return found.folds, found.places
 
     def divergence(self) -> float:

@@ -575,17 +575,20 @@ class WarpMap:
         region = 0, 0, side, len(places) * side
         compose(target, region=region, **self._parts(), origins=for_images(origins), step=step)
 
-    def statistics(self, size: tuple[int, int] | None = None) -> MapStatistics:
+    def statistics(self, size: tuple[int, int] | None = None, amount: float = 1.0) -> MapStatistics:
         """How the whole map distorts, measured on a lattice of `size`; waits for the GPU.
 
         By default it has a place for each texel of the accumulated map, or for a whole number of texels if there would
-        be more than `MOST_PLACES`.
+        be more than `MOST_PLACES`. `amount`: of the map, scaled as one displacement; see `ScaledMap`.
         """
         if size is None:
             width, height = self.size
             stride = math.ceil(math.sqrt(width * height / MOST_PLACES))
             size = -(-width // stride), -(-height // stride)
-        return distortion(self.device, size, self._held_defines(), self._parts())
+        defines, parts = self._held_defines(), self._parts()
+        if amount != 1:
+            defines, parts = defines | {"PART": 1}, parts | {"amount": amount}
+        return distortion(self.device, size, defines, parts)
 
     # -- its parts --------------------------------------------------------------------------------------------------
 

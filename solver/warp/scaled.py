@@ -10,6 +10,7 @@ from solver.gl.field import Field, FieldPool
 from solver.gl.passes import Region
 from solver.gl.points import draw_at
 from solver.limits import check_type, places
+from solver.warp.distortion import MapStatistics
 from solver.warp.map import WarpMap
 
 
@@ -106,6 +107,10 @@ class ScaledMap:
             return self.warp.at(points)
         field = self.composed(exact=True)
         return draw_at(self.device, places(points), self.extent, "warp/resample.frag", displacement=field)
+
+    def statistics(self, size: tuple[int, int] | None = None) -> MapStatistics:
+        """As `WarpMap.statistics`: of this part where something is held, else of the whole, which folds no less."""
+        return self.warp.statistics(size, 1.0 if self.warp.held is None else self.amount)
 
     def release(self) -> None:
         """Free the textures; the map stays."""

@@ -129,6 +129,29 @@ def test_one_fold_of_the_warp_is_told_when_it_comes_up(robot: Robot, monkeypatch
     assert [message.text for message in messages.shown] == ["The warp folds over itself in 1 of 6912 places. Undo."]
 
 
+def test_a_fold_of_a_part_of_the_warp_alone_is_told_with_what_helps(
+    robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A turn by three quarters, and a frozen corner: it folds at 50 % and not at 100 %."""
+    session, messages = robot.editor.session, robot.editor.messages
+    y, x = (np.mgrid[0:180, 0:240] + 0.5) / 240 - np.array([0.375, 0.5])[:, None, None]
+    angle = 1.5 * np.pi * np.clip(1 - (x**2 + y**2) / 0.3**2, 0, None) ** 2
+    turned = [x * np.cos(angle) - y * np.sin(angle) - x, x * np.sin(angle) + y * np.cos(angle) - y]
+    session.replay.warp.set(np.stack(turned, axis=-1).astype(np.float32))
+    corner = np.zeros((180, 240), np.float32)
+    corner[:8, :8] = 1
+    session.replay.warp.hold(session.device.upload(corner, "corner"))
+    monkeypatch.setattr("app.ui.canvas.PARTS", 1)
+    robot.frame(count=2)
+    assert not messages.shown
+    session.edit("Amount", amount=0.5)
+    robot.frame(count=2)
+    said = [message.text for message in messages.shown]
+    assert len(said) == 1
+    mend = "Set Amount to 100 %, where it does not."
+    assert re.fullmatch(rf"The warp folds over itself in \d+ of 6912 places. {mend}", said[0])
+
+
 def test_the_newest_of_a_long_history_is_in_sight(robot: Robot) -> None:
     """A row of the present entry's ground; also after steps back and forth."""
     ground = np.array([67, 55, 37])

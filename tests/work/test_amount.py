@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from itertools import pairwise
 from pathlib import Path
 
@@ -175,3 +176,27 @@ def test_what_is_frozen_keeps_every_bit_at_every_amount(device: Device) -> None:
         assert not np.array_equal(found, PICTURE.pixels)
     sampler.release()
     replay.release()
+
+
+def test_a_part_that_folds_beside_what_is_frozen_is_told(device: Device, fluidwarp: Run, tmp_path: Path) -> None:
+    """A half turn far from a frozen corner: where anything is frozen all is scaled in one, and half of it folds."""
+    corner = Stroke(tool="freeze", radius=0.03, hardness=1.0, samples=((0, 0.04, 0.06, 1.0), (1, 0.04, 0.06, 1.0)))
+    recipe = TURNED.edited(stroke=(corner, TWIRL))
+    replay = at_end(device, recipe)
+    scaled = ScaledMap(replay.warp)
+    assert scaled.statistics() == replay.warp.statistics()
+    assert scaled.statistics().folds == 0
+    for amount in (0.3, 0.5, 1.2, 1.5):
+        scaled.amount = amount
+        found, drawn = scaled.statistics(scaled.size), looked_at(device, scaled)
+        assert found.folds == pytest.approx(drawn.folds, rel=0.02, abs=40), amount
+        assert found.displacement_max == pytest.approx(drawn.displacement_max, rel=1e-3), amount
+    scaled.release()
+    replay.release()
+    write_picture(tmp_path / "picture.png", PICTURE)
+    (tmp_path / "part.toml").write_text(recipe.edited(picture="picture.png", amount=0.5).text())
+    said = fluidwarp(tmp_path, "render", "part.toml", "-o", "a.png").stderr
+    assert re.fullmatch(
+        r"fluidwarp: the warp folds over itself in \d+ of \d+ places at an amount of 0.5, and in none at 1\n", said
+    )
+    assert not fluidwarp(tmp_path, "render", "part.toml", "-o", "b.png", "--amount", "1").stderr

@@ -138,7 +138,7 @@ def test_pairs_that_ask_for_the_impossible_are_fitted_as_far_as_can_be(fluidwarp
     """Of reaches at both ends of their range, which shall change alike, none can change at all."""
     write_picture(tmp_path / "a.png", Picture(np.zeros((23, 37, 4), np.uint16)))
     (tmp_path / "r.toml").write_text('picture = "a.png"\nduration = 0.1\n[fluid]\ngrid = 16\n')
-    (tmp_path / "p.csv").write_text("0.3,0.3,0.6,0.6\n0.3,0.3,0.1,0.1\n0.300001,0.3,0.9,0.2\n")
+    (tmp_path / "p.csv").write_text("3.3,3.3,3.6,3.6\n3.3,3.3,3.1,3.1\n3.300001,3.3,3.9,3.2\n")
     done = fluidwarp(tmp_path, "fit", "r.toml", "--pairs", "p.csv", "-o", "f.toml")
     assert done.returncode == 0
     assert done.stderr.count("\n") == 2

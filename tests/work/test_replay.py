@@ -12,8 +12,8 @@ import pytest
 from app.errors import UserError
 from app.media.auxiliary import Pictures
 from app.model.picture import Picture
-from app.model.recipe import Recipe
-from app.model.strokes import Sample, Stroke
+from app.model.recipe import FluidSettings, Recipe
+from app.model.strokes import Change, Sample, Stroke
 from app.work.observation import whereabouts
 from app.work.replay import Replay
 from solver import energy
@@ -93,6 +93,25 @@ def test_going_anywhere_gives_the_same_bytes(replay: Replay, moments: list[bytes
         replay.seek(tick)
         assert replay.tick == tick
         assert moment(replay) == moments[tick]
+
+
+def test_from_a_moment_where_the_walls_change_it_goes_on_with_the_same_bytes(device: Device) -> None:
+    """The step after uses a trace between the new walls, whether or not the one before has left it another."""
+    push = Stroke(tool="push", radius=0.3, samples=((0, 0.2, 0.1, 1.0), (6, 0.7, 0.1, 1.0)))
+    change = (Change(tick=4, walls="no-slip"), Change(tick=6, walls="free-slip"))
+    recipe = Recipe(stroke=(push,), change=change, duration=0.2, fluid=FluidSettings(grid=24, viscosity=1e-4))
+    replay = Replay(device, recipe, pictures(), budget=0)
+    straight, kept = [moment(replay)], [replay.snapshot()]
+    for _ in range(9):
+        replay.advance()
+        straight.append(moment(replay))
+        kept.append(replay.snapshot())
+    for start, snapshot in enumerate(kept[:-1]):
+        replay.resume(start, snapshot)
+        for tick in range(start + 1, min(start + 3, 10)):
+            replay.advance()
+            assert moment(replay) == straight[tick], (start, tick)
+    replay.release()
 
 
 @pytest.mark.parametrize("later", ["freeze", "thicken"])
