@@ -106,11 +106,8 @@ class SavedTiles:
         return [tile for tile in self.tiles.flat if not tile.is_blank]
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """The tiles that are not blank, off the GPU: their `places` (n,), counted by rows, and all `texels` of them.
-
-        Those drawn into that hold what a blank one holds are only counted up, in `bare` (n,), if there are any.
-        """
-        places, texels, bare = list[int](), list[np.ndarray](), list[int]()
+        """The tiles that are not blank, off the GPU: their `places` (n,), counted by rows, and all `texels` of them."""
+        places, texels = list[int](), list[np.ndarray]()
         dtype = np.dtype(DTYPES[self.kind.dtype])
         blank = round(self.blank * np.iinfo(dtype).max) if dtype.kind == "u" else self.blank
         bits = np.array([blank], dtype).view(f"u{dtype.itemsize}")
@@ -120,13 +117,15 @@ class SavedTiles:
                 if (values.view(bits.dtype) != bits).any():
                     places.append(place)
                     texels.append(values)
-                else:
-                    bare.append(place)
-        arrays = {"places": np.array(places, np.int32), "texels": np.concatenate([np.zeros(0, dtype), *texels])}
-        return arrays | ({"bare": np.array(bare, np.int32)} if bare else {})
+        return {"places": np.array(places, np.int32), "texels": np.concatenate([np.zeros(0, dtype), *texels])}
+
+    def bare(self, places: np.ndarray) -> np.ndarray:
+        """Those that something was drawn into, besides these."""
+        drawn = np.flatnonzero([not tile.is_blank for tile in self.tiles.flat])
+        return np.setdiff1d(drawn, places).astype(np.int32)
 
     def with_arrays(self, device: Device, arrays: Mapping[str, np.ndarray]) -> SavedTiles:
-        """A new one of the same kind, holding what `arrays()` gave.
+        """A new one of the same kind, holding what `arrays()` gave; `bare` besides, if it is there.
 
         Raises:
             ValueError: if that is of something else.

@@ -33,6 +33,15 @@ GLIDING: Images = (1.0, 1.0, 1.0, 1.0)
 class MapState(State):
     """The state of a warp map: its submap and those that wait, each of a grid, its factors and its tiles."""
 
+    def arrays(self) -> dict[str, np.ndarray]:
+        """As of any state, and which tiles have moved and hold nothing any more: they are closed with the map."""
+        arrays = super().arrays()
+        for name, saved in self.tiles.items():
+            if name == ACCUMULATED or name.startswith(UNDONE):
+                bare = saved.bare(arrays[f"{name}/places"])
+                arrays |= {f"{name}/bare": bare} if bare.size else {}
+        return arrays
+
     def with_arrays(self, device: Device, arrays: Mapping[str, np.ndarray]) -> MapState:
         """A state of a map of the same picture, on whatever grid, that holds what `arrays()` gave.
 
