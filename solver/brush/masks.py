@@ -129,8 +129,6 @@ class Masks:
         means = self.device.field(size, 1, "means of a mask")
         means.texture.filter = moderngl.LINEAR, moderngl.LINEAR
         for name, mask in self._painted.items():
-            if not mask.tiles:
-                continue  # it holds nothing any more, as one that nothing has been painted on
             self.device.pass_("brush/coarsen.frag")(means, mask=mask, **blocks)
             if name == "frozen" and not means.get().any():
                 continue  # to the map, what is no longer frozen and what never was must be the same
