@@ -266,6 +266,22 @@ def test_what_floats_lies_on_the_canvas_however_narrow_that_is(
     assert not told
 
 
+def test_the_bar_has_room_for_export_however_narrow_it_is(
+    device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Sliders that it has no room for go behind its last button, which has to have room itself."""
+    likes, told, laid = Preferences(auto_quality=False, scale=1.5), dict[str, list[str]](), Laid(monkeypatch)
+    with Robot(device, small_project(tmp_path), SIZES[0], preferences=likes) as robot:
+        for tool in TOOLS:
+            robot.editor.state.choose_tool(tool.name, False)
+            for width in range(700, 900, 11):
+                robot.size = width, 520
+                robot.frame(count=2)
+                if faults := laid.faults(robot.frame):
+                    told[f"{tool.name}, {width}"] = faults
+    assert not told
+
+
 DRAWN = ("add_", "push_clip_rect", "text_unformatted", "input_text", "combo")  # at places of the screen
 PLACES = {"add_circle": 2, "add_circle_filled": 2, "add_polyline": 6, "add_text": 2, "text_unformatted": 2}  # else 4
 ACROSS, DOWN, WIDE, THIN = 6.0, 2.0, 5.0, 0.3  # points that are no fault: of places, widths, and thicknesses

@@ -121,11 +121,11 @@ def _brush(ui: Ui, layout: Layout, workspace: Workspace, state: EditorState, lik
     while parts:
         imgui.same_line(0, gap)
         width, draw = parts[0]
-        if imgui.get_cursor_pos_x() + width + button > room:
+        gap = ui.px(16 if len(parts) > len(settings) else 8)  # more behind the directions
+        if imgui.get_cursor_pos_x() + width + gap + ui.px(32) > room:
             break
         imgui.set_cursor_pos_y(ui.px(10))
         draw(across)
-        gap = ui.px(16 if state.tool.directions and len(parts) > len(settings) else 8)
         del parts[0]
     else:
         imgui.same_line(0, ui.px(8))
