@@ -645,6 +645,27 @@ def test_a_force_that_never_acts_is_remarked_on(folder: Path, fluidwarp: Run):
     assert (folder / "x.png").exists()
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere names are UTF-8, whatever the locale")
+@pytest.mark.parametrize("name", ["ß.png", "ß.%04d.png", "ß/a.%04d.png"])
+def test_a_name_that_the_locale_has_no_letters_for_is_told(folder: Path, name: str) -> None:
+    """Of an old farm without UTF-8, where a recipe comes from a desk with it."""
+    (folder / "b.toml").write_text(f'picture = "{name}"\n[fluid]\ngrid = 32\n', "utf-8")
+    ran = subprocess.run(
+        [sys.executable, "-m", "app", "render", "b.toml", "-o", "x.png"],
+        cwd=folder,
+        env=os.environ | {"PYTHONPATH": str(ROOT), "LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"},
+        capture_output=True,
+        text=True,
+    )
+    assert ran.returncode == 1
+    told = name.replace("ß", "\\xdf")
+    assert ran.stderr.startswith(f"fluidwarp: Cannot read {told}")
+    assert ran.stderr.endswith(
+        "names of files are ascii here, which lacks some of its characters; set LC_ALL=C.UTF-8.\n"
+    )
+    assert not (folder / "x.png").exists()
+
+
 def test_interrupted_leaves_nothing(folder: Path):
     """As a user does it: Ctrl+C in the middle of a long animation."""
     import signal
