@@ -257,13 +257,24 @@ def listed(names: Sequence[str]) -> tuple[str, bool]:
 def takes_place(output: str | os.PathLike[str], source: str | os.PathLike[str]) -> bool:
     """Whether writing `output` can replace `source`; both are real paths of a file or of a sequence."""
     folder, name = os.path.split(source)
-    if os.path.dirname(output) != folder:
+    if not _is_one(os.path.dirname(output), folder):
         return False
     pattern = os.path.basename(output)
     if stands_for_files(source):
         # with so many digits two that differ in nothing but their padding are alike
         return number_in(name, pattern) is not None or numbered(name, 10**17) == numbered(pattern, 10**17)
-    return name == pattern or number_in(pattern, name) is not None
+    return _is_one(output, source) or name == pattern or number_in(pattern, name) is not None
+
+
+def _is_one(path: str | os.PathLike[str], other: str | os.PathLike[str]) -> bool:
+    """Whether two real paths are one: also those that differ in capitals, where the disk takes these for the same."""
+    path, other = os.fspath(path), os.fspath(other)
+    if path == other or path.casefold() != other.casefold():
+        return path == other
+    try:
+        return os.path.samefile(path, other)
+    except OSError:  # one of them is not there
+        return False
 
 
 def check_kept(source: str | os.PathLike[str], output: str | os.PathLike[str]) -> None:

@@ -129,6 +129,20 @@ def test_nor_through_links_that_are_some_of_its_files(tmp_path: Path, is_output:
         check_kept(*((real, links) if is_output else (links, real)))
 
 
+def test_a_name_in_other_capitals_is_the_same_file_where_the_disk_says_so(tmp_path: Path) -> None:
+    """As on most disks of macOS and Windows; here two names of one file stand for that."""
+    (source := tmp_path / "a.png").touch()
+    (other := tmp_path / "A.PNG").touch()
+    check_kept(source, other)
+    check_kept(source, tmp_path / "A.png")
+    other.unlink()
+    os.link(source, other)
+    with pytest.raises(UserError, match="would be replaced by its own result"):
+        check_kept(source, other)
+    os.link(source, tmp_path / "b.png")  # which is replaced alone
+    check_kept(source, tmp_path / "b.png")
+
+
 def test_who_may_read_a_file_stays_so_when_it_is_replaced(tmp_path: Path) -> None:
     (file := tmp_path / "a.png").touch(0o600)
     file.chmod(0o640)
