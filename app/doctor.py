@@ -126,7 +126,7 @@ def _encoder() -> Finding:
 def ask(module: str, **environment: str) -> dict:
     """What `python -m module` prints as JSON, or {"error": why it did not}."""
     environment = {
-        **os.environ, "PYTHONPATH": os.pathsep.join([str(Path(app.__path__[0]).parent), *sys.path]),
+        **os.environ, "PYTHONPATH": os.pathsep.join([str(Path(app.__path__[0]).parent), *filter(None, sys.path)]),
         "EGL_LOG_LEVEL": "warning", **environment
     }  # fmt: skip
     try:

@@ -10,6 +10,9 @@ def main() -> None:
     Ctrl+C ends the process at once wherever no job has taken it over (see `app.progress.interruptible`): a module that
     is being loaded, above all one in C, can make anything of an exception.
     """
+    # Python looks for modules in the present folder first, which may be anybody's pictures with a numpy.py among them:
+    # no process that is started from here, by us or by a library, shall (CPython, PYTHONSAFEPATH).
+    os.environ["PYTHONSAFEPATH"] = "1"
     os.environ.setdefault("EGL_LOG_LEVEL", "fatal")  # what Mesa complains of, our sentence and the doctor tell
     try:
         import signal

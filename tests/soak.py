@@ -3,7 +3,7 @@
     python tests/soak.py [--strokes 10000] [--undos 1000] [--pictures 100] [--seed 0]
 
 Every so many strokes another picture is opened in the same editor, after the last one was saved; every so many of them
-some are undone and made again. What a work holds while it is painted on depends on its size: up to 400 MB of
+some are undone and made again. What a work holds while it is painted on depends on its size: up to 320 MiB of
 checkpoints, and as much of the work before it. So memory and the objects of OpenGL are looked at where there is the
 same to hold each time: when the work has been left, for a small picture that is opened twice and not touched. Both are
 told; ends with 0 if at the end they are within a tenth of what they were after the warm-up, which is over once a tenth

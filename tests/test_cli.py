@@ -645,6 +645,57 @@ def test_a_force_that_never_acts_is_remarked_on(folder: Path, fluidwarp: Run):
     assert (folder / "x.png").exists()
 
 
+@pytest.mark.parametrize("words", [("render", "a.toml", "cat.png", "dog.png", "-o", "out", "-j", "2"), ("doctor",)])
+def test_no_module_in_the_present_folder_is_run(folder: Path, words: tuple[str, ...]) -> None:
+    """A folder of somebody else's pictures may hold anything; the command itself begins without it, as installed."""
+    (folder / "dog.png").write_bytes((folder / "cat.png").read_bytes())
+    for module in ("app", "ctypes", "numpy", "pickle", "solver"):
+        (folder / f"{module}.py").write_text(f"open('run-{module}', 'w')")
+    ran = subprocess.run(
+        [sys.executable, "-P", "-m", "app", *words],
+        cwd=folder,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+    )
+    assert not list(folder.glob("run-*"))
+    assert "Error" not in ran.stderr + ran.stdout
+    if words[0] == "render":
+        assert (ran.returncode, here(folder / "out")) == (0, {"cat.png", "dog.png"})
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere names are UTF-8, whatever the locale")
+@pytest.mark.parametrize("name", ["ß.png", "ß.%04d.png", "ß/a.%04d.png"])
+def test_a_name_that_the_locale_has_no_letters_for_is_told(folder: Path, name: str) -> None:
+    """Of an old farm without UTF-8, where a recipe comes from a desk with it."""
+    (folder / "b.toml").write_text(f'picture = "{name}"\n[fluid]\ngrid = 32\n', "utf-8")
+    ran = subprocess.run(
+        [sys.executable, "-m", "app", "render", "b.toml", "-o", "x.png"],
+        cwd=folder,
+        env=os.environ | {"PYTHONPATH": str(ROOT), "LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"},
+        capture_output=True,
+        text=True,
+    )
+    assert ran.returncode == 1
+    told = name.replace("ß", "\\xdf")
+    assert ran.stderr.startswith(f"fluidwarp: Cannot read {told}")
+    assert ran.stderr.endswith(
+        "names of files are ascii here, which lacks some of its characters; set LC_ALL=C.UTF-8.\n"
+    )
+    assert not (folder / "x.png").exists()
+
+
+def test_a_fit_does_not_take_the_place_of_its_recipe(folder: Path, fluidwarp: Run) -> None:
+    """Whose comments would be gone, and where its handles led."""
+    before = (folder / "a.toml").read_bytes()
+    (folder / "link.toml").symlink_to("a.toml")
+    for output in ("a.toml", "link.toml", str(folder / "a.toml")):
+        ran = fluidwarp(folder, "fit", "a.toml", "-o", output)
+        assert (ran.returncode, ran.stdout) == (1, "")
+        assert ran.stderr == "fluidwarp: a.toml would be replaced by its own result; choose another name\n"
+    assert (folder / "a.toml").read_bytes() == before
+
+
 def test_interrupted_leaves_nothing(folder: Path):
     """As a user does it: Ctrl+C in the middle of a long animation."""
     import signal

@@ -14,7 +14,7 @@ from itertools import pairwise, product
 from pathlib import Path
 
 from app.errors import UserError
-from app.media.inputs import cannot_read
+from app.media.inputs import cannot_read, no_name
 from app.media.leftovers import sweep, temporary_name
 from app.progress import if_abandoned
 
@@ -190,6 +190,8 @@ def numbered_files(pattern: str | os.PathLike[str]) -> dict[int, Path]:
         raise UserError(f"Cannot read {pattern}: there is no folder {folder}; check the name.") from None
     except OSError as error:
         raise cannot_read(pattern, error) from None
+    except ValueError as error:
+        raise no_name(pattern, error) from None
     found = sorted((number, name) for name in names if (number := number_in(pattern, name)) is not None)
     if not found:
         raise UserError(f"Cannot read {pattern}: there is no such file; check the name.")
@@ -255,13 +257,24 @@ def listed(names: Sequence[str]) -> tuple[str, bool]:
 def takes_place(output: str | os.PathLike[str], source: str | os.PathLike[str]) -> bool:
     """Whether writing `output` can replace `source`; both are real paths of a file or of a sequence."""
     folder, name = os.path.split(source)
-    if os.path.dirname(output) != folder:
+    if not _is_one(os.path.dirname(output), folder):
         return False
     pattern = os.path.basename(output)
     if stands_for_files(source):
         # with so many digits two that differ in nothing but their padding are alike
         return number_in(name, pattern) is not None or numbered(name, 10**17) == numbered(pattern, 10**17)
-    return name == pattern or number_in(pattern, name) is not None
+    return _is_one(output, source) or name == pattern or number_in(pattern, name) is not None
+
+
+def _is_one(path: str | os.PathLike[str], other: str | os.PathLike[str]) -> bool:
+    """Whether two real paths are one: also those that differ in capitals, where the disk takes these for the same."""
+    path, other = os.fspath(path), os.fspath(other)
+    if path == other or path.casefold() != other.casefold():
+        return path == other
+    try:
+        return os.path.samefile(path, other)
+    except OSError:  # one of them is not there
+        return False
 
 
 def check_kept(source: str | os.PathLike[str], output: str | os.PathLike[str]) -> None:
@@ -271,8 +284,14 @@ def check_kept(source: str | os.PathLike[str], output: str | os.PathLike[str]) -
 
 
 def _real_places(path: str | os.PathLike[str]) -> list[str]:
-    """The real path of a file or of a sequence, and those of its files that are links to somewhere else."""
-    places = [os.path.realpath(path)]
+    """The real path of a file or of a sequence, and those of its files that are links to somewhere else.
+
+    Raises `UserError` if the system knows no such name.
+    """
+    try:
+        places = [os.path.realpath(path)]
+    except ValueError as error:
+        raise no_name(path, error) from None
     if is_sequence(path):
         with suppress(OSError):
             links = (link for link in os.scandir(Path(path).parent) if link.is_symlink())
@@ -327,7 +346,7 @@ def replacing(path: str | os.PathLike[str], backup: Path | None = None) -> Itera
         with temporary_file(temporary_beside(target)) as temporary:
             yield temporary
             with suppress(OSError):  # who may read it stays as it was, if it is there and the disk knows of that
-                os.chmod(temporary, stat.S_IMODE(target.stat().st_mode))
+                _hand_over(temporary, target.stat())
             if backup is not None:
                 sync(temporary)
                 if target.exists():
@@ -341,6 +360,20 @@ def replacing(path: str | os.PathLike[str], backup: Path | None = None) -> Itera
         if target.parent.is_dir():
             raise
         raise cannot_write(path, FileNotFoundError(errno.ENOENT, "")) from None
+
+
+def _hand_over(path: Path, status: os.stat_result) -> None:
+    """Let a new file be whose the one of this status was, as far as this process may say so, with its permissions.
+
+    Raises `OSError`.
+    """
+    if hasattr(os, "chown"):  # not on Windows
+        try:
+            os.chown(path, status.st_uid, status.st_gid)
+        except OSError:  # only the superuser gives files away, but anybody to a group of theirs
+            with suppress(OSError):
+                os.chown(path, -1, status.st_gid)
+    os.chmod(path, stat.S_IMODE(status.st_mode) & ~(stat.S_ISUID | stat.S_ISGID))  # of what was in it
 
 
 def _keep(path: Path, backup: Path) -> None:

@@ -47,10 +47,20 @@ def open_input(path: str | os.PathLike[str], kind: str = "file", most: int | Non
             stream.close()
             raise
         return stream
-    except ValueError:
-        raise UserError(f"Cannot read {path}: no file has a NUL in its name; check the name.") from None
+    except ValueError as error:
+        raise no_name(path, error) from None
     except OSError as error:
         raise cannot_read(path, error) from None
+
+
+def no_name(path: str | os.PathLike[str], error: ValueError) -> UserError:
+    """What it means for the user that the system takes `path` for no name of a file at all."""
+    if isinstance(error, UnicodeEncodeError):
+        return UserError(
+            f"Cannot read {path}: names of files are {error.encoding} here, which lacks some of its characters; "
+            "set LC_ALL=C.UTF-8."
+        )
+    return UserError(f"Cannot read {path}: no file has a NUL in its name; check the name.")
 
 
 def is_address(name: str) -> bool:

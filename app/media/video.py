@@ -135,7 +135,8 @@ class Video(FileClip):
             if complaint := process.complaint():
                 notice(f"{self.path} is damaged, and what could be read of it was used (ffmpeg says: {complaint})")
             elif self.frames is not None and count < self.frames - max(2, self.fps):  # by more than a second
-                notice(f"{self.path} should have about {self.frames} frames by its length, and has {count}")
+                besides = ": its sound is longer, or it was cut" if self.sounds else ""
+                notice(f"{self.path} should have about {self.frames} frames by its length, and has {count}{besides}")
 
     def _check_unchanged(self, begins: bool = False) -> None:
         """Raise `UserError` if the file is not as it was: the frames would be fewer, or some of another clip.
@@ -175,8 +176,7 @@ def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Vid
     width, height, fps = _shown(file, filters)
     colours, sounds = _colours(video), _sounds(told)
     check_size(file, width, height, max_pixels)
-    length = re.search(r"Duration: (\d+):(\d+):([\d.]+)", told)
-    seconds = sum(float(n) * s for n, s in zip(length.groups(), (3600, 60, 1), strict=True)) if length else None
+    seconds = _seconds(told)
     return Video(
         path=file,
         width=width,
@@ -356,6 +356,17 @@ def _sounds(told: str) -> list[SoundTrack]:
                 )
             )
     return tracks
+
+
+def _seconds(told: str) -> float | None:
+    """How long a file is, from its start on, by ffmpeg's words; None if it does not say."""
+    length = re.search(r"Duration: (\d+):(\d+):([\d.]+)(?:, start: ([\d.]+))?", told)
+    if length is None:
+        return None
+    seconds = int(length[1]) * 3600 + int(length[2]) * 60 + float(length[3])
+    start = float(length[4] or 0)
+    # Of a Matroska this is when it ends, which counts from 0 whenever it starts, as a recording that went on.
+    return seconds - start if "Input #0, matroska" in told and seconds > start else seconds
 
 
 def _late(told: str, video: str) -> float:

@@ -19,6 +19,7 @@ MOST_PARTS = 16  # of a dotted key
 LONGEST_WORD = 200  # characters of a number, or of a key without quotes
 LONGEST_STRING = 10_000
 MOST_WORDS = 200_000  # keys, values and brackets, but for those of lists of numbers; a stroke has about 20
+MOST_MARKS = 3 * MOST_WORDS  # commas, dots, signs of equality and brackets: words are parted by fewer
 MOST_NUMBERS = 2_000_000  # in lists of them; of an hour's painting there are 432,000, four to a tick
 MOST_LINES = 500_000  # of which each costs a parser as much as a word, if there is nothing on it
 LONG = 200  # characters of lists of numbers that are worth being read by json
@@ -38,6 +39,7 @@ _TOKENS = re.compile(
     | (?P<unfinished> \"{{3}} | '{{3}} | ["'])
     | \#[^\n]*+
     | (?P<mark> [][{{}}.,=\n])
+    | [^][{{}}.,=\n\w+:"'\#-]{{9,}}+  # spaces, and what belongs nowhere: each would be looked at by all of the above
     """,
     re.VERBOSE | re.DOTALL,
 )
@@ -48,8 +50,8 @@ def parsed(text: str, source: str) -> dict[str, Any]:
 
     Raises `UserError` naming the file and the line.
     """
-    rows = _check(text, source)
-    rest, lists = _without(rows, text)
+    rows, end = _check(text, source)
+    rest, lists = _without(rows, text[:end])
     try:
         return _with(lists, tomllib.loads(rest))
     except tomllib.TOMLDecodeError as error:
@@ -95,8 +97,11 @@ def _with(lists: dict[str, tuple[Any, ...]], value: Any) -> Any:
     return tuple(chain.from_iterable(rows))
 
 
-def _check(text: str, source: str) -> list[tuple[int, int]]:
-    """Raise `UserError` for what no recipe needs and a parser suffers from; where long rows of lists of numbers are."""
+def _check(text: str, source: str) -> tuple[list[tuple[int, int]], int]:
+    """Raise `UserError` for what no recipe needs and a parser suffers from.
+
+    Returns where long rows of lists of numbers are; and how much of `text` the parser needs to say what is wrong.
+    """
 
     def refuse(at: int, what: str) -> UserError:
         line = text.count("\n", 0, at) + 1
@@ -105,7 +110,8 @@ def _check(text: str, source: str) -> list[tuple[int, int]]:
     if text.count("\n") > MOST_LINES:
         raise UserError(f"{source} has more than {MOST_LINES} lines, more than any recipe needs; get it again")
     rows: list[tuple[int, int]] = []
-    depth = dots = words = numbers = 0
+    depth = dots = words = marks = numbers = 0
+    end = len(text)
     before = ""  # the last mark, if nothing came after it
     for token in _TOKENS.finditer(text):
         kind, length = token.lastgroup, token.end() - token.start()
@@ -126,13 +132,17 @@ def _check(text: str, source: str) -> list[tuple[int, int]]:
         elif kind == "string" and length > LONGEST_STRING:
             raise refuse(token.start(), f"a text of {length} characters")
         elif kind == "unfinished":
-            break  # the parser goes no further, and says so
+            end = token.end() + LONGEST_STRING  # the parser goes no further than its end, and says so
+            break
         elif kind == "mark":
             mark = token[0]
+            marks += mark != "\n"
+            if marks > MOST_MARKS:
+                raise refuse(token.start(), f"the {marks}th of its commas, dots, signs of equality and brackets")
             dots = dots + 1 if mark == "." else 0
             depth = depth + 1 if mark in "[{" else max(0, depth - 1) if mark in "]}" else depth
             if depth > DEEPEST:
                 raise refuse(token.start(), f"lists or tables nested more than {DEEPEST} deep")
             if dots >= MOST_PARTS:
                 raise refuse(token.start(), f"a key of more than {MOST_PARTS} parts")
-    return rows
+    return rows, end

@@ -97,7 +97,7 @@ class FitJob:
             raise UserError(f"{self.output}: a fitted recipe is a file that ends with .toml")
         for path in filter(None, (self.output, self.arrived)):
             writable(path)
-            for source in (*self.pairs, *(self.masks or ()), *filter(None, [self.image])):
+            for source in (Path(self.recipe), *self.pairs, *(self.masks or ()), *filter(None, [self.image])):
                 check_kept(source, path)
         if self.arrived is not None:
             check_ending(self.arrived)

@@ -475,6 +475,7 @@ class _Search:
         self.notices: list[str] = []
         self.numbers = self._usable(base)
         self.fine = _Stage(base, pictures, A_FINE_ONE)
+        self._caught: list[tuple[list[int], str, str]] = []  # what cannot be met, and why, of one and of more
         self.hopeful = self._reachable()
         stride = -(-self.longer // COARSE_PICTURE)
         small = replace(picture, pixels=np.ascontiguousarray(picture.pixels[::stride, ::stride]))
@@ -555,12 +556,7 @@ class _Search:
             self.notices.append("the picture folds even so: the recipe itself folds it")
         errors = trial.errors * self.longer
         missed = [number for number in self.numbers if not trial.errors[number] <= ARRIVED]
-        most = max((errors[number] for number in missed), default=0.0)
-        self._note(
-            missed,
-            f"ends {most:.3g} pixels from where it should be",
-            f"end up to {most:.3g} pixels from where they should be",
-        )
+        self._note_missed(missed, errors)
         self._explain(trial.recipe, bool(missed))
         arrived = np.stack([self.pairs[:, 0], trial.arrived], axis=1)[self.numbers]
         pairs = Pairs(arrived, tuple(self.aim.pairs.curves[number] for number in self.numbers))
@@ -645,6 +641,24 @@ class _Search:
         curve = self.aim.pairs.curves[number]
         return self.aim.names[number] + (f' of the curve "{curve[:40]}"' if curve else "")
 
+    def _note_missed(self, missed: Sequence[int], errors: np.ndarray) -> None:
+        """Note which pairs cannot be met, which are missed, and by how much: each pair in one sentence."""
+
+        def away(numbers: Sequence[int]) -> tuple[str, str]:
+            most = max((errors[number] for number in numbers), default=0.0)
+            off = f"{most:.3g} pixels from where"
+            return f"ends {off} it should be", f"end up to {off} they should be"
+
+        for numbers, one, more in self._caught:
+            self._note([number for number in numbers if number not in missed], one, more)
+        for numbers, one, more in self._caught:
+            off = [number for number in numbers if number in missed]
+            of_one, of_more = away(off)
+            self._note(off, f"{one}; it {of_one}", f"{more}; they {of_more}")
+        caught = [number for numbers, *_ in self._caught for number in numbers]
+        others = [number for number in missed if number not in caught]
+        self._note(others, *away(others))
+
     def _note(self, numbers: Sequence[int], of_one: str, of_more: str) -> None:
         """Note what is to be said of some pairs, in one sentence."""
         if len(numbers):
@@ -692,7 +706,7 @@ class _Search:
         return numbers
 
     def _reachable(self) -> np.ndarray:
-        """The numbers of the pairs with nothing frozen at their ends or all across their ways; the others are noted.
+        """The numbers of the pairs with nothing frozen at their ends or all across their ways; the others are caught.
 
         Of a mask that is changed later no such thing can be said: what is frozen at first may be thawed by then.
         """
@@ -719,9 +733,12 @@ class _Search:
             else:
                 hopeful.append(number)
         for end in ("point", "place"):
-            self._note(caught[end], f"cannot be met: its {end} is frozen", f"cannot be met: their {end}s are frozen")
+            told = f"cannot be met: its {end} is frozen", f"cannot be met: their {end}s are frozen"
+            self._caught.append((caught[end], *told))
         between = "cannot be met: what is frozen lies between"
-        self._note(caught[""], f"{between} its point and its place", f"{between} their points and their places")
+        self._caught.append(
+            (caught[""], f"{between} its point and its place", f"{between} their points and their places")
+        )
         return np.array(hopeful, int)
 
 

@@ -1069,7 +1069,23 @@ def test_a_clip_that_was_cut_before_is_read_and_told(tmp_path: Path):
     assert len(list(read_clip(path).read_frames(notice=said.append))) == 40
     assert len(said) == 2
     assert "a.mkv is damaged, and what could be read of it was used" in said[0]
-    assert said[1] == f"{path} should have about 80 frames by its length, and has 40"
+    told = f"{path} should have about 80 frames by its length, and has 40"
+    assert said[1] == f"{told}: its sound is longer, or it was cut"
+
+
+@pytest.mark.parametrize("offset", [0, 1.5, 36000])
+@pytest.mark.parametrize("ending", ["mkv", "webm", "mov"])
+def test_a_clip_of_which_the_clock_began_long_before_is_as_long_as_it_is(tmp_path: Path, offset: float, ending: str):
+    """A recording that went on keeps its time in a Matroska, whose length is told from 0: of 10 hours, not 2 s."""
+    codec = "libvpx-vp9" if ending == "webm" else "mjpeg"
+    path = generate(
+        tmp_path / f"a.{ending}", "testsrc=s=64x48:r=10:d=2", "-c:v", codec, "-output_ts_offset", str(offset)
+    )
+    said: list[str] = []
+    clip = read_clip(path)
+    assert clip.frames == 20
+    assert len(list(clip.read_frames(notice=said.append))) == 20
+    assert not said
 
 
 def test_a_clip_that_is_replaced_or_deleted_while_it_is_read_is_read_to_its_end(tmp_path: Path):

@@ -446,6 +446,15 @@ def test_of_an_animation_no_more_frames_are_read_than_a_bound(
                 read_pages(path, first)
 
 
+@pytest.mark.parametrize(("count", "told"), [(3, "of its 3 frames none"), (1, "of its 1 frame none")])
+def test_the_still_before_an_apng_is_none_of_its_frames(tmp_path: Path, count: int, told: str):
+    still, *others = [Image.new("RGB", (WIDTH, HEIGHT), (40 * number, 90, 0)) for number in range(count + 1)]
+    still.save(path := tmp_path / "a.png", save_all=True, append_images=others, default_image=True)
+    read = read_picture(path)
+    assert read.pixels[0, 0].tolist() == [0, 90, 0]
+    assert read.note == f"a.png: {told} is used, but the still before them"
+
+
 def test_a_still_is_no_animation(tmp_path: Path):
     Image.new("RGB", (8, 8)).save(tmp_path / "a.png")
     assert apng.read((tmp_path / "a.png").read_bytes()) is None

@@ -5,6 +5,9 @@ from __future__ import annotations
 import errno
 import ntpath
 import os
+import subprocess
+import sys
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -126,6 +129,20 @@ def test_nor_through_links_that_are_some_of_its_files(tmp_path: Path, is_output:
         check_kept(*((real, links) if is_output else (links, real)))
 
 
+def test_a_name_in_other_capitals_is_the_same_file_where_the_disk_says_so(tmp_path: Path) -> None:
+    """As on most disks of macOS and Windows; here two names of one file stand for that."""
+    (source := tmp_path / "a.png").touch()
+    (other := tmp_path / "A.PNG").touch()
+    check_kept(source, other)
+    check_kept(source, tmp_path / "A.png")
+    other.unlink()
+    os.link(source, other)
+    with pytest.raises(UserError, match="would be replaced by its own result"):
+        check_kept(source, other)
+    os.link(source, tmp_path / "b.png")  # which is replaced alone
+    check_kept(source, tmp_path / "b.png")
+
+
 def test_who_may_read_a_file_stays_so_when_it_is_replaced(tmp_path: Path) -> None:
     (file := tmp_path / "a.png").touch(0o600)
     file.chmod(0o640)
@@ -133,6 +150,42 @@ def test_who_may_read_a_file_stays_so_when_it_is_replaced(tmp_path: Path) -> Non
         temporary.write_bytes(b"new")
     assert file.read_bytes() == b"new"
     assert file.stat().st_mode & 0o777 == 0o640
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only the superuser gives files away")
+def test_whose_a_file_is_stays_so_when_it_is_replaced(tmp_path: Path) -> None:
+    """Or what root renders over an artist's file the artist cannot write any more; but no program of theirs is made."""
+    (file := tmp_path / "a.png").touch()
+    os.chown(file, 1234, 5678)
+    file.chmod(0o6754)
+    with replacing(file) as temporary:
+        temporary.write_bytes(b"new")
+    status = file.stat()
+    assert (status.st_uid, status.st_gid, status.st_mode & 0o7777) == (1234, 5678, 0o754)
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only the superuser becomes others")
+def test_a_file_stays_with_its_group_when_one_of_them_replaces_it() -> None:
+    """Who cannot give it back to its owner leaves it to the group that shares the folder."""
+    code = """
+import os
+from app.media.files import replacing
+os.setgroups([5678])
+os.setgid(4321)
+os.setuid(4321)
+with replacing("a.png") as temporary:
+    temporary.write_bytes(b"new")
+"""
+    with tempfile.TemporaryDirectory() as name:  # pytest's own is for root alone
+        folder, file = Path(name), Path(name) / "a.png"
+        file.touch()
+        os.chown(file, 1234, 5678)
+        file.chmod(0o664)
+        folder.chmod(0o777)
+        environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])}
+        subprocess.run([sys.executable, "-c", code], check=True, cwd=folder, env=environment)
+        status = file.stat()
+    assert (status.st_uid, status.st_gid, status.st_mode & 0o7777) == (4321, 5678, 0o664)
 
 
 def test_on_a_disk_without_modes_a_file_is_replaced_all_the_same(

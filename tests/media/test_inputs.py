@@ -324,6 +324,31 @@ def test_points_of_a_path_and_corners_are_counted(table: str, key: str, most: in
         recipe(most + 1)
 
 
+@pytest.mark.parametrize("mark", [",", "=", "]", "}", ", ", "] \t"])
+def test_marks_are_counted_that_stand_between_nothing(mark: str) -> None:
+    """Each costs as much as a word; 64 MB of them took 40 s."""
+    text = f"a = 1\n{mark * (toml.MOST_MARKS + 1)}"
+    with pytest.raises(UserError, match=r"^a\.toml, line 2: the 600001th of its commas, dots, signs of equality and"):
+        toml.parsed(text, "a.toml")
+
+
+def test_marks_between_words_are_not_too_many() -> None:
+    lists = toml.MOST_WORDS - 9
+    assert len(toml.parsed(f"a = [\n{'[],' * lists}\n]", "a.toml")["a"]) == lists
+
+
+@pytest.mark.parametrize("quotes", ['"', "'''", '"""'])
+def test_a_text_without_an_end_is_not_read_to_its_end(quotes: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The parser takes 2 s for each 10 MB of backslashes."""
+    given: list[str] = []
+    loads = tomllib.loads
+    monkeypatch.setattr(tomllib, "loads", lambda text: given.append(text) or loads(text))
+    with pytest.raises(UserError, match=r"^a\.toml is not valid TOML: (Unterminated string|Expected \"'''\")"):
+        toml.parsed(f"a = 1\nb = {quotes}" + "\\\\" * 100_000, "a.toml")
+    assert given[0].startswith(f"a = 1\nb = {quotes}")
+    assert len(given[0]) < 2 * toml.LONGEST_STRING
+
+
 ROWS = {
     "samples": "a = [{row}]",
     "with others": "a = [ [1, 2], 'b', {row}, {{c = [{row}, []]}}, [[{row}]] ]  # [[{row}]]",

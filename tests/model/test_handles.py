@@ -215,3 +215,8 @@ def test_the_window_calls_the_radius_as_its_slider_is_called() -> None:
 def test_the_window_tells_how_far_in_pixels_alone() -> None:
     said = 'handle[2] "chin" is 2.95 pixels (5.9e-03 longer sides) from where it should be: it has not begun'
     assert heading(said) == 'Handle 2 "chin" is 2.95 pixels from where it should be: it has not begun'
+
+
+def test_handles_are_counted_before_they_are_looked_at() -> None:
+    with pytest.raises(UserError, match="there are 65 handles and pins; at most 64 work"):
+        Recipe.parse("[[pin]]\nat = 1\n" * 65)

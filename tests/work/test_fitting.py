@@ -122,6 +122,19 @@ def test_however_many_pairs_cannot_be_met_each_reason_is_told_in_one_sentence(de
     )
 
 
+def test_pairs_of_which_some_are_frozen_are_each_told_once(device: Device):
+    """With why they are missed, where that is known."""
+    frozen = [[[0.5, 0.3 + 0.1 * number], [0.7, 0.3 + 0.1 * number]] for number in range(2)]
+    crossing = [[[0.1, 0.2], [0.3, 0.2]], [[0.3, 0.2], [0.1, 0.2]]]
+    caught, missed = fit(device, np.array([*frozen, *crossing]), 1, RECIPE + WALL).notices
+    assert re.fullmatch(
+        r"pair 1, pair 2 cannot be met: their points are frozen; "
+        r"they end up to [\d.]+ pixels from where they should be",
+        caught,
+    )
+    assert re.match(r"pair 3, pair 4 end up to [\d.]+ pixels from where they should be; handle", missed)
+
+
 def test_pairs_in_each_others_way_are_told_once_with_how_far_they_miss(device: Device):
     same = [[[0.4, 0.5], [0.5, 0.5]], [[0.4, 0.5], [0.3, 0.5]]]
     (told,) = fit(device, np.array(same), 1).notices
@@ -163,7 +176,10 @@ def test_what_is_frozen_only_at_first_can_be_met(device: Device):
     thawed = '[[mask]]\nkind = "clear"\ntick = 2\nof = "frozen"\n'
     handle = "[[handle]]\nat = [0.4, 0.5]\nto = [0.43, 0.5]\nstart = 0.12\n"
     held = fit(device, None, 1, RECIPE + handle + frozen)
-    assert "handle[1] cannot be met: its point is frozen" in held.notices
+    (told,) = (notice for notice in held.notices if "handle[1]" in notice)
+    assert re.fullmatch(
+        r"handle\[1\] cannot be met: its point is frozen; it ends [\d.]+ pixels from where it should be", told
+    )
     found = fit(device, None, 1, RECIPE + handle + frozen + thawed)
     assert not any("frozen" in notice for notice in found.notices), found.notices
 

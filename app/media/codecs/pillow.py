@@ -89,8 +89,12 @@ def picture_of(
     with suppress(Exception):  # those after the first may be damaged
         if (there := count or getattr(image, "n_frames", 1)) > 1:
             frames = "pictures" if image.format in ("JPEG", "MPO") else "frames"
+            used = "only the first is used"
+            if not count and getattr(image, "default_image", False):  # of an APNG, and is none of its frames
+                there, used = there - 1, "none is used, but the still before them"
+                frames = "frame" if there == 1 else frames
             told = there if there <= MOST_FRAMES else f"more than {MOST_FRAMES}"
-            losses.append(f"of its {told} {frames} only the first is used")
+            losses.append(f"of its {told} {frames} {used}")
     return Picture(
         upright(pixels if pixels.ndim == 3 else pixels[..., None], orientation),
         icc=icc,
