@@ -28,6 +28,7 @@ from solver.warp.remapping import FEW_TILES, MOST_TILES, REMAP_STEPS
 from solver.warp.state import MOST_CLOSED
 from solver.warp.submap import Level
 from support import reference
+from support.arrays import assert_near
 from support.flows import VORTEX_TIME, saved, vortex, vortex_faces
 
 
@@ -198,7 +199,7 @@ def test_what_is_its_own_image_beyond_an_edge_goes_on_exactly(seed: int, cubic: 
 
     field = wanted(*np.meshgrid(*2 * [(np.arange(16) + 0.5) / 8]))
     expected = wanted(*np.meshgrid(*2 * [(np.arange(24) + 0.5) / 64]))  # of the first three texels
-    assert read_between(device, field, images, (24, 24), 3 / 16, cubic) == pytest.approx(expected, rel=1e-5, abs=1e-5)
+    assert_near(read_between(device, field, images, (24, 24), 3 / 16, cubic), expected, rel=1e-5, abs=1e-5)
 
 
 @pytest.mark.parametrize("cubic", [True, False], ids=["cubic", "quintic"])
@@ -216,7 +217,7 @@ def test_what_lies_beyond_the_edges_is_mirrored_and_transposed_with_the_map(
 
     plain = found("")
     for turn in TURNS:
-        assert found(turn) == pytest.approx(turned_map(plain, turn), rel=1e-5, abs=1e-5), turn
+        assert_near(found(turn), turned_map(plain, turn), rel=1e-5, abs=1e-5, note=turn)
 
 
 def test_what_no_flow_crosses_the_map_does_not_leave(device: Device) -> None:
