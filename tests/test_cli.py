@@ -544,6 +544,8 @@ BAD = {
     "several into one": (["a.toml", "cat.png", "cat.png", "-o", "x.png"], "{name}"),
     "grid 0": (["a.toml", "-o", "x.png", "--grid", "0"], "--grid must be at least 8, not 0"),
     "fps nan": (["a.toml", "-o", "x.gif", "--fps", "nan"], "--fps must be a finite number"),
+    "amount": (["a.toml", "-o", "x.png", "--amount", "1.6"], "--amount must be at most 1.5, not 1.6"),
+    "filter": (["a.toml", "-o", "x.png", "--filter", "soft"], "--filter must be one of"),
     "size": (["a.toml", "-o", "x.png", "--size", "99999"], "--size must be at most 32768, not 99999"),
     "quality": (["a.toml", "-o", "x.jpg", "--quality", "0"], "--quality must be at least 1, not 0"),
     "from nan": (["a.toml", "-o", "x.gif", "--from", "nan"], "--from must be a finite number"),

@@ -1,4 +1,4 @@
-"""Where files are looked for and what is remembered of them, how long what is told of them stays, and the pointer's shape."""
+"""Where files are looked for, how long what is told of them stays, and which shape the pointer has."""
 
 from __future__ import annotations
 
@@ -82,12 +82,16 @@ def test_of_what_is_saved_of_thickness_it_is_told_that_what_is_thinned_is_not_in
     robot: Robot, tmp_path: Path
 ) -> None:
     editor = robot.editor
-    editor.state.mask = "thickness"
-    for decades, said in ((2.0, "Saved a.png."), (-1.0, "Saved a.png. What is thinned is not in it.")):
-        editor.state.mask_decades = decades
-        editor.do("mask_fill")
-        editor.files.save_mask(tmp_path / "a.png", "thickness")
-        assert editor.messages.shown[-1].text == said
+    editor.state.mask, editor.state.mask_decades = "thickness", -1.0
+    half = np.zeros((180, 240, 1), np.uint8)
+    half[:, :120] = 255
+    write_picture(tmp_path / "half.png", Picture(half))
+    editor.files.load_mask(tmp_path / "half.png", "thickness")  # the other half is as the fluid is
+    editor.files.save_mask(tmp_path / "a.png", "thickness")
+    assert editor.messages.shown[-1].text == "Saved a.png."
+    editor.do("mask_fill")
+    editor.files.save_mask(tmp_path / "a.png", "thickness")
+    assert editor.messages.shown[-1].text == "Saved a.png. What is thinned is not in it."
 
 
 def test_a_map_to_start_from_is_told_and_its_folder_kept(robot: Robot, tmp_path: Path) -> None:
