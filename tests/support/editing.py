@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import moderngl
 import numpy as np
@@ -30,17 +32,30 @@ BY_KEY = {key: action for action in ACTIONS.values() for key in action.keys}
 
 def pattern(width: int = 240, height: int = 180) -> Picture:
     """A picture on which every shift shows: a checkerboard in colours that change all over it."""
+    return Picture(_pattern(width, height).copy())
+
+
+@cache
+def _pattern(width: int, height: int) -> np.ndarray:
     y, x = np.mgrid[0:height, 0:width]
     board = ((x // 12 + y // 12) % 2)[..., None]
     colours = np.stack([x * 255 // width, y * 255 // height, 128 + 0 * x], axis=-1)
-    return Picture(np.where(board, colours, 255 - colours).astype(np.uint8))
+    return np.where(board, colours, 255 - colours).astype(np.uint8)
+
+
+@cache
+def _file() -> bytes:
+    """The pattern's file: most tests of the window begin with it."""
+    from app.media.pictures import write_picture
+
+    with TemporaryDirectory() as folder:
+        write_picture(Path(folder) / "pattern.png", pattern())
+        return (Path(folder) / "pattern.png").read_bytes()
 
 
 def small_project(folder: Path, grid: int = 48) -> Project:
     """The pattern as a new project, on a coarse grid."""
-    from app.media.pictures import write_picture
-
-    write_picture(folder / "pattern.png", pattern())
+    (folder / "pattern.png").write_bytes(_file())
     recipe = fresh_recipe()
     return from_picture(folder / "pattern.png", recipe.edited(fluid=recipe.fluid.model_copy(update={"grid": grid})))
 

@@ -210,15 +210,13 @@ def test_cancelling_leaves_what_is_finished(folder: Path):
     assert sorted(contents(folder / "out")) == ["p0.png", "p1.png"]
 
 
-def test_the_command_line(folder: Path):
+def test_the_command_line(folder: Path, fluidwarp: Run):
     """Two processes, a failure, a line about it, a status; and with nothing wrong, not a word."""
 
-    def fluidwarp(*words: str) -> subprocess.CompletedProcess[str]:
-        command = [sys.executable, "-m", "app", "render", "a.toml", *words]
-        environment = os.environ | {"PYTHONPATH": str(ROOT)}
-        return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=100)
+    def render(*words: str) -> subprocess.CompletedProcess[str]:
+        return fluidwarp(folder, "render", "a.toml", *words)
 
-    ran = fluidwarp("p0.png", "gone.png", "p1.png", "-o", "out", "--jobs", "2")
+    ran = render("p0.png", "gone.png", "p1.png", "-o", "out", "--jobs", "2")
     assert ran.returncode == 1
     assert ran.stderr.splitlines() == [
         f"fluidwarp: Cannot read {folder / 'gone.png'}: there is no such file; check the name.",
@@ -226,7 +224,7 @@ def test_the_command_line(folder: Path):
     ]
     assert sorted(contents(folder / "out")) == ["p0.png", "p1.png"]
     gone = [*(f"gone.{number}.png" for number in (1001, 1002, 1003, 1010)), "new\nline.png"]
-    ran = fluidwarp(*gone, "-o", "new/folder")
+    ran = render(*gone, "-o", "new/folder")
     assert ran.returncode == 1
     assert ran.stderr.splitlines() == [
         f"fluidwarp: Cannot read {folder / gone[0]}: there is no such file; check the name.",
@@ -234,29 +232,29 @@ def test_the_command_line(folder: Path):
     ]
     assert not (folder / "new").exists()
     (folder / "empty.png").write_bytes(b"")
-    ran = fluidwarp("gone.png", "p0.png", "empty.png", "-o", "out")
+    ran = render("gone.png", "p0.png", "empty.png", "-o", "out")
     named = "gone.png, empty.png; --verbose tells why"
     assert ran.stderr.splitlines()[1:] == [f"fluidwarp: 2 of 3 pictures failed: {named}; all others are written"]
-    ran = fluidwarp("gone.png", "p0.png", "empty.png", "-o", "out", "--verbose")
+    ran = render("gone.png", "p0.png", "empty.png", "-o", "out", "--verbose")
     assert ran.stderr.splitlines() == [
         f"fluidwarp: Cannot read {folder / 'gone.png'}: there is no such file; check the name.",
         f"fluidwarp: Cannot read {folder / 'empty.png'}: the file is empty; save or download it again.",
         "fluidwarp: 2 of 3 pictures failed: gone.png, empty.png; all others are written",
     ]
     letters = [f"{letter}.png" for letter in "abcdefghij"]
-    ran = fluidwarp(*letters, "-o", "new")
+    ran = render(*letters, "-o", "new")
     assert ran.stderr.endswith("h.png and 2 more; --verbose tells all names; none is written\n")
-    ran = fluidwarp(*letters, "-o", "new", "--verbose")
+    ran = render(*letters, "-o", "new", "--verbose")
     assert [line.partition(": there is")[0] for line in ran.stderr.splitlines()[:-1]] == [
         f"fluidwarp: Cannot read {folder / name}" for name in letters
     ]
     assert ran.stderr.endswith("h.png and 2 more; none is written\n")
-    ran = fluidwarp("gone.png", "-o", "out")
+    ran = render("gone.png", "-o", "out")
     assert ran.returncode == 1
     assert ran.stderr == f"fluidwarp: Cannot read {folder / 'gone.png'}: there is no such file; check the name.\n"
-    ran = fluidwarp("p0.png", "p1.png", "-o", "a.toml/out")
+    ran = render("p0.png", "p1.png", "-o", "a.toml/out")
     assert ran.stderr == "fluidwarp: Cannot write a.toml/out: a part of its path is a file; choose another folder.\n"
-    ran = fluidwarp("p2.png", "-o", "out")
+    ran = render("p2.png", "-o", "out")
     assert (ran.returncode, ran.stdout, ran.stderr) == (0, "", "")
     assert (folder / "out/p2.png").is_file()
 

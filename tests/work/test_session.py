@@ -204,17 +204,21 @@ def test_a_stroke_with_which_too_many_would_act_at_once_is_refused_when_it_ends(
 def test_two_hundred_strokes_saved_and_rendered_are_the_same_map(
     device: Device, session: Session, tmp_path: Path
 ) -> None:
+    """Among them four handles and pins: each is led at every tick from then on, and eighteen took most of the time."""
     dice = random.Random(2)
     for _ in range(200):
         start = dice.uniform(0.1, 0.9), dice.uniform(0.1, 0.9)
         end = start[0] + dice.uniform(-0.08, 0.08), start[1] + dice.uniform(-0.08, 0.08)
-        paint(session, dice.choice(PAINTING).name, start, end, 1, dice.random() < 0.3)
+        led = len(session.recipe.handle) + len(session.recipe.pin)
+        tools = [tool.name for tool in PAINTING if tool.name != "handle" or led < 4]
+        paint(session, dice.choice(tools), start, end, 1, dice.random() < 0.3)
         session.advance(dice.randrange(2))
     session.settle()
+    assert len(session.recipe.handle) + len(session.recipe.pin) == 4
     projects.save(replace(session.project, recipe=session.document.recipe), tmp_path / "w.fluidwarp")
     loaded = projects.load(tmp_path / "w.fluidwarp")
     assert loaded.recipe == session.recipe
-    assert len(loaded.recipe.stroke) > 180
+    assert len(loaded.recipe.stroke) > 190
     maps = MapOutput(tmp_path / "w.npy")
     run(device, Job(loaded.recipe, loaded.picture, loaded.folder, Outputs(None, maps=maps)), Progress())
     size = loaded.picture.width, loaded.picture.height

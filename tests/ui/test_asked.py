@@ -1,0 +1,185 @@
+"""Where files are looked for, how long what is told of them stays, and which shape the pointer has."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.media.pictures import read_picture, write_picture
+from app.media.project import load
+from app.model.handles import RecipePin
+from app.model.picture import Picture
+from app.ui.browser import Browser
+from app.ui.events import LEFT, MIDDLE, RIGHT
+from app.ui.saving import SaveDialog
+from support.editing import Robot, pattern, write_foreign_map
+from support.widgets import Widgets
+
+ASKING = ("open", "open_frames", "apply_to", "import_map", "mask_load", "mask_save", "fit_masks")
+
+
+def test_files_are_looked_for_where_the_last_ones_were(robot: Robot, tmp_path: Path) -> None:
+    editor, there = robot.editor, tmp_path / "there"
+    there.mkdir()
+    editor.preferences.folder = str(there)
+    for name in ASKING:
+        editor.do(name)
+        asked = editor.dialogs.shown[-1]
+        assert isinstance(asked, Browser)
+        assert (asked.folder, asked.name) == (there, "pattern-frozen.png" if name == "mask_save" else ""), name
+        assert asked.writes == (name == "mask_save")
+        asked.close()
+        robot.frame(count=2)
+    editor.do("save_as")
+    asked = editor.dialogs.shown[-1]
+    assert isinstance(asked, SaveDialog)
+    assert asked.path == there / "pattern.fluidwarp"
+
+
+def test_a_mask_of_what_moves_is_asked_for_first_and_then_one_of_where_it_goes_beside_it(
+    robot: Robot, widgets: Widgets, tmp_path: Path
+) -> None:
+    editor, there = robot.editor, tmp_path / "there"
+    there.mkdir()
+    y, x = np.mgrid[0:180, 0:240]
+    for name, across in (("one", 100), ("other", 120)):
+        disc = (np.hypot(x - across, y - 90) < 40)[..., None]
+        write_picture(there / f"{name}.png", Picture((255 * disc).astype(np.uint8)))
+    fitted: list[object] = []
+    editor.files.fit = lambda files, masks: fitted.append((files, masks))
+    editor.do("fit_masks")
+    for name, button in (("one", "Choose"), ("other", "Fit")):
+        asked = editor.dialogs.shown[-1]
+        assert isinstance(asked, Browser)
+        assert fitted == []
+        if name == "other":
+            assert (asked.folder, [path.name for path in asked.inside]) == (there, ["one.png", "other.png"])
+        asked.typed = str(there / f"{name}.png")
+        widgets.click(button)
+    assert fitted == [((), (there / "one.png", there / "other.png"))]
+
+
+def test_a_mask_that_has_been_changed_meanwhile_is_read_again(robot: Robot, tmp_path: Path) -> None:
+    editor, there = robot.editor, tmp_path / "there"
+    there.mkdir()
+    shares = []
+    for white in (80, 160):
+        pixels = np.zeros((180, 240, 1), np.uint8)
+        pixels[:, :white] = 255
+        write_picture(there / "mask.png", Picture(pixels))
+        editor.files.load_mask(there / "mask.png", "frozen")
+        robot.rest()
+        editor.files.save_mask(tmp_path / "saved.png", "frozen")
+        shares.append((read_picture(tmp_path / "saved.png").pixels > 2**15).mean())
+    assert shares == pytest.approx([1 / 3, 2 / 3], abs=0.01)
+    assert editor.preferences.folder == str(there)
+
+
+def test_of_what_is_saved_of_thickness_it_is_told_that_what_is_thinned_is_not_in_it(
+    robot: Robot, tmp_path: Path
+) -> None:
+    editor = robot.editor
+    editor.state.mask, editor.state.mask_decades = "thickness", -1.0
+    half = np.zeros((180, 240, 1), np.uint8)
+    half[:, :120] = 255
+    write_picture(tmp_path / "half.png", Picture(half))
+    editor.files.load_mask(tmp_path / "half.png", "thickness")  # the other half is as the fluid is
+    editor.files.save_mask(tmp_path / "a.png", "thickness")
+    assert editor.messages.shown[-1].text == "Saved a.png."
+    editor.do("mask_fill")
+    editor.files.save_mask(tmp_path / "a.png", "thickness")
+    assert editor.messages.shown[-1].text == "Saved a.png. What is thinned is not in it."
+
+
+def test_a_map_to_start_from_is_told_and_its_folder_kept(robot: Robot, tmp_path: Path) -> None:
+    there = tmp_path / "there"
+    there.mkdir()
+    write_foreign_map(there / "m.exr", 240, 180)
+    robot.editor.files.start_from_map(there / "m.exr")
+    assert robot.editor.preferences.folder == str(there)
+    assert robot.editor.messages.shown[-1].text == "The picture now starts from m.exr. Undo removes it."
+
+
+def test_that_a_file_cannot_be_opened_stays_until_another_one_is(robot: Robot, tmp_path: Path) -> None:
+    editor = robot.editor
+    (tmp_path / "bad.png").write_bytes(b"nothing")
+    robot.drop(tmp_path / "bad.png")
+    robot.frame(count=300, dt=0.1)
+    assert ["bad.png" in message.text for message in editor.messages.shown] == [True]
+    write_picture(tmp_path / "good.png", pattern(60, 40))
+    robot.drop(tmp_path / "good.png")
+    robot.frame()
+    assert editor.messages.shown == []
+
+
+def holds_picture(path: Path) -> bool:
+    with zipfile.ZipFile(path) as archive:
+        return any(name.endswith(".png") and "pattern" in name for name in archive.namelist())
+
+
+def test_a_picture_goes_into_a_project_as_it_was_saved_last_or_else_as_the_person_likes(
+    robot: Robot, tmp_path: Path
+) -> None:
+    editor, first, then = robot.editor, tmp_path / "first.fluidwarp", tmp_path / "then.fluidwarp"
+    editor.preferences.embed = False
+    editor.files.write(first)
+    assert not load(first).embedded
+    editor.preferences.embed = True
+    editor.files.write(then)
+    assert not load(then).embedded
+    editor.files.write(then, embed=True)
+    editor.preferences.embed = False
+    editor.files.write(then)
+    assert load(then).embedded
+    assert [holds_picture(path) for path in (first, then)] == [False, True]
+    assert editor.preferences.recent[:2] == [str(then), str(first)]
+    assert editor.messages.shown[-1].text == "Saved then.fluidwarp"
+
+
+def test_the_pointer_has_the_shape_of_what_it_would_do(robot: Robot) -> None:
+    editor, state, pointer = robot.editor, robot.editor.state, robot.editor.pointer
+    editor.session.edit("Pin", pin=(RecipePin(at=(0.3, 0.3)),))
+    robot.rest()
+    found, free, pinned = dict[str, str](), robot.at(0.6, 0.6), robot.at(0.3, 0.3)
+
+    def look(name: str, at: tuple[float, float]) -> None:
+        robot.move(*at)
+        found[name] = pointer.cursor
+
+    look("off the canvas", (5, 5))
+    for tool in ("push", "freeze", "handle", "pan", "zoom", "select"):
+        state.choose_tool(tool, False)
+        look(tool, free)
+        look(f"{tool} on a pin", pinned)
+    state.choose_tool("push", False)
+    robot.hold("space", True)
+    look("space", free)
+    robot.hold("space", False)
+    for button, name in ((LEFT, "painting"), (MIDDLE, "panning"), (RIGHT, "sizing")):
+        robot.move(*free)
+        robot.press(button)
+        look(name, (free[0] + 12, free[1]))
+        robot.release(button)
+    robot.rest()
+    state.split = 0.5
+    look("split", robot.at(0.5, 0.9))
+    look("just on the split", (robot.at(0.5, 0.9)[0] + 8, robot.at(0.5, 0.9)[1]))
+    look("beside the split", (robot.at(0.5, 0.9)[0] + 9, robot.at(0.5, 0.9)[1]))
+    ring = ("push", "push on a pin", "freeze", "freeze on a pin", "handle", "painting", "sizing", "beside the split")
+    wanted = {"off the canvas": "arrow", "handle on a pin": "hand", "split": "resize_ew"} | dict.fromkeys(ring, "none")
+    wanted |= dict.fromkeys(("pan", "pan on a pin", "space", "panning"), "hand") | {"just on the split": "resize_ew"}
+    wanted |= dict.fromkeys(("zoom", "zoom on a pin", "select", "select on a pin"), "crosshair")
+    assert found == wanted
+
+
+def test_what_is_copied_as_a_recipe_is_the_recipe(robot: Robot) -> None:
+    copied: list[str] = []
+    robot.editor.commands.clipboard = copied.append
+    robot.drag((0.4, 0.5), (0.5, 0.5), steps=3)
+    robot.rest()
+    robot.editor.do("copy_recipe")
+    assert copied == [robot.editor.session.recipe.text()]
+    assert robot.editor.messages.shown[-1].text == "The recipe is on the clipboard, as TOML."
