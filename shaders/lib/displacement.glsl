@@ -81,32 +81,65 @@ vec2 cubic_displacement(sampler2D displacement, vec2 p, vec4 images, out mat2 sl
     return sum;
 }
 
-// The cubic at the corners of a rectangle as far across as `side`, in texels, from p on, where it is the polynomial at p:
-// top left and right, bottom left and right. 12 reads.
-void cubic_corners(sampler2D displacement, vec2 p, vec2 side, vec4 images, out vec2 corners[4]) {
-    vec2 size = vec2(textureSize(displacement, 0)), texel = 1.0 / size;
-    vec2 cell = cell_at(p, size, 1.0, images), f = p - 0.5 - cell;
+// What a level is read from: of the four cells around a place the displacement (rg of `value`), how its second differences
+// along x differ along y (ba), and those along x (rg of `bend`) and y (ba); see warp/difference.frag.
+struct Nodes {
+    vec4 value[4];
+    vec4 bend[4];
+};
+
+// 8 reads; f: where p lies between them, 0-1.
+Nodes nodes_at(sampler2D differences, vec2 p, vec4 images, out vec2 f) {
+    vec2 size = vec2(textureSize(differences, 0)) * vec2(1.0, 0.5), texel = 1.0 / size;
+    vec2 cell = cell_at(p, size, 0.0, images);
+    f = p - 0.5 - cell;
     vec4 ux, uy, vx, vy;
-    vec4 x = imaged(cell.x + vec4(-0.5, 0.5, 1.5, 2.5), size.x, images.xy, ux, vx) * texel.x;
-    vec4 y = imaged(cell.y + vec4(-0.5, 0.5, 1.5, 2.5), size.y, images.zw, vy, uy) * texel.y;
-    vec4 cx[2], lx[2], by[2], ly[2];
-    for (int k = 0; k < 2; ++k) {
-        vec2 at = f + float(k) * side;
-        cx[k] = cubic_lagrange(at.x);
-        lx[k] = vec4(0.0, 1.0 - at.x, at.x, 0.0);
-        ly[k] = vec4(0.0, 1.0 - at.y, at.y, 0.0);
-        by[k] = cubic_lagrange(at.y) - ly[k];
+    vec4 x = imaged(cell.x + vec4(0.5, 1.5, 0.5, 1.5), size.x, images.xy, ux, vx) * texel.x;
+    vec4 y = imaged(cell.y + vec4(0.5, 0.5, 1.5, 1.5), size.y, images.zw, vy, uy) * (0.5 * texel.y);
+    Nodes nodes;
+    for (int k = 0; k < 4; ++k) {
+        vec4 count = vec4(ux[k] * uy[k], vx[k] * vy[k], ux[k] * uy[k], vx[k] * vy[k]);
+        nodes.value[k] = count * texture(differences, vec2(x[k], y[k]));
+        nodes.bend[k] = count * texture(differences, vec2(x[k], y[k] + 0.5));
     }
-    for (int k = 0; k < 4; ++k) corners[k] = vec2(0.0);
-    for (int j = 0; j < 4; ++j)
-        for (int i = 0; i < 4; ++i) {
-            if (i % 3 == 0 && j % 3 == 0) continue;
-            vec2 value = texture(displacement, vec2(x[i], y[j])).rg * vec2(ux[i] * uy[j], vx[i] * vy[j]);
-            for (int k = 0; k < 4; ++k) {
-                int a = k % 2, b = k / 2;
-                corners[k] += (cx[a][i] * ly[b][j] + lx[a][i] * by[b][j]) * value;
-            }
+    return nodes;
+}
+
+// Everett's formula up to second differences, and its derivative: how much they count, a part t of a cell from the next one.
+vec2 everett(vec2 t) { return t * (t * t - 1.0) * (1.0 / 6.0); }
+vec2 everett_slope(vec2 t) { return 0.5 * t * t - 1.0 / 6.0; }
+
+// Between four cells, linearly and bent by second differences along either axis and along both.
+vec2 between_nodes(Nodes nodes, vec2 f) {
+    vec2 lx = vec2(1.0 - f.x, f.x), ly = vec2(1.0 - f.y, f.y), ex = everett(lx), ey = everett(ly), sum = vec2(0.0);
+    for (int j = 0; j < 2; ++j)
+        sum += ly[j] * (lx.x * nodes.value[2 * j].rg + lx.y * nodes.value[2 * j + 1].rg
+                        + ex.x * nodes.bend[2 * j].rg + ex.y * nodes.bend[2 * j + 1].rg)
+             + ey[j] * (lx.x * nodes.bend[2 * j].ba + lx.y * nodes.bend[2 * j + 1].ba
+                        + ex.x * nodes.value[2 * j].ba + ex.y * nodes.value[2 * j + 1].ba);
+    return sum;
+}
+
+// The same with its derivatives along x (first column) and y, to a cell.
+vec2 between_nodes(Nodes nodes, vec2 f, out mat2 slope) {
+    vec2 lx = vec2(1.0 - f.x, f.x), ly = vec2(1.0 - f.y, f.y), ex = everett(lx), ey = everett(ly), sum = vec2(0.0);
+    vec2 along = vec2(-1.0, 1.0), sx = along * everett_slope(lx), sy = along * everett_slope(ly);
+    slope = mat2(0.0);
+    for (int j = 0; j < 2; ++j)
+        for (int i = 0; i < 2; ++i) {
+            vec4 value = nodes.value[2 * j + i], bend = nodes.bend[2 * j + i];
+            vec2 across = lx[i] * value.rg + ex[i] * bend.rg, bent = lx[i] * bend.ba + ex[i] * value.ba;
+            sum += ly[j] * across + ey[j] * bent;
+            slope[0] += ly[j] * (along[i] * value.rg + sx[i] * bend.rg) + ey[j] * (along[i] * bend.ba + sx[i] * value.ba);
+            slope[1] += along[j] * across + sy[j] * bent;
         }
+    return sum;
+}
+
+vec2 bent_displacement(sampler2D differences, vec2 p, vec4 images) {
+    vec2 f;
+    Nodes nodes = nodes_at(differences, p, images, f);
+    return between_nodes(nodes, f);
 }
 
 // Six-point quintic both ways: on an accumulated map of twice the grid as good as the cubic on one of four times. 36 reads.

@@ -1,6 +1,6 @@
-// The Jacobian of the warp map by the chain rule: the product of those of its parts, each by the derivatives of the cubic
-// both ways; where something is undone (see `undo` in lib/warp.glsl), that of back + part (x led to - x).
-// 32 reads, and 16 more for each of LEVELS above 1 and of CLOSED, 4 for each of WEIGHED.
+// The Jacobian of the warp map by the chain rule: the product of those of its parts, each by the derivatives of what it is
+// read by; where something is undone (see `undo` in lib/warp.glsl), that of back + part (x led to - x).
+// 24 reads, and 8 more for each of LEVELS above 1, 16 of CLOSED, 4 for each of WEIGHED.
 #include "lib/warp.glsl"
 
 // What the map does at x.
@@ -20,8 +20,8 @@ struct Bend {
 #endif
 };
 
-// What becomes of the area of a rectangle whose corners, as those of `cubic_corners`, are moved so, in its sides: half the
-// product of its diagonals, negative where it is folded. Of three of them, what turns within it seems to fold.
+// What becomes of the area of a rectangle whose corners, top left and right, then bottom ones, are moved so, in its sides:
+// half the product of its diagonals, negative where it is folded. Of three of them, what turns within it seems to fold.
 float area_of(vec2 corners[4]) {
     vec2 down = 1.0 + corners[3] - corners[0], up = vec2(1.0, -1.0) + corners[1] - corners[2];
     return 0.5 * (down.y * up.x - down.x * up.y);
@@ -29,17 +29,20 @@ float area_of(vec2 corners[4]) {
 
 // What a submap does at x + moved, with its weight w.
 void bend_by(int level, sampler2D submap, vec4 window, vec4 images, vec2 x, inout Bend bend) {
-    vec2 place = x + bend.moved, size = vec2(textureSize(submap, 0)), density = size / window.zw;
+    vec2 place = x + bend.moved, size = cells_of(submap), density = size / window.zw, f;
     vec2 texel = u_picture / vec2(textureSize(u_accumulated, 0));
     vec3 at = in_window(window, place);
     mat2 slope;
     vec2 fading, corners[4];
     float w = weight(level, submap, window, place, fading);
-    cubic_corners(submap, at.xy * size, texel * density, abs(u_edges) * images, corners);
-    for (int k = 0; k < 4; ++k) corners[k] *= at.z * (w + dot(fading, vec2(k % 2, k / 2))) / texel;
+    Nodes nodes = nodes_at(submap, at.xy * size, images, f);
+    for (int k = 0; k < 4; ++k) {
+        vec2 corner = vec2(k % 2, k / 2);
+        corners[k] = at.z * (w + dot(fading, corner)) / texel * between_nodes(nodes, f + corner * texel * density);
+    }
     bend.between *= area_of(corners);
     fading /= texel;
-    vec2 more = cubic_displacement(submap, at.xy * size, abs(u_edges) * images, slope);
+    vec2 more = between_nodes(nodes, f, slope);
     bend.moved = within_picture(x, bend.moved + w * more * at.z);
     mat2 next = mat2(1.0) + at.z * (w * mat2(slope[0] * density.x, slope[1] * density.y) + outerProduct(more, fading));
     bend.determinant *= determinant(next);

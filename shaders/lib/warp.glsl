@@ -5,11 +5,12 @@
 //   that follows. A place that is looked up in the next part is kept in the picture, and x + D(x) within u_limits, as all
 //   texels are: between them a polynomial exceeds them, and composed again and again that would grow without end.
 // u_box_0 to u_box_8: where a closed map begins, in texels of A, and its own texels for each of these.
-// u_submap, u_second, u_third, u_accumulated, u_closed_0 to u_closed_8: displacements, longer sides, and of what is undone
-// the part, 0-1, in the third component; u_window, u_second_window, u_third_window: left, top, width and height that the
-// submaps cover, u_picture: width and height of the picture, u_limits: left, top, right, bottom, longer sides; u_images,
-// u_second_images, u_third_images: what lies beyond the windows' sides, u_edges, u_edges_0 to u_edges_8: beyond the
-// picture's, of A and of closed maps, as in lib/displacement.glsl; 0 if something has crossed them: nothing has images then.
+// u_submap, u_second, u_third: what submaps are read from, see warp/difference.frag; u_accumulated, u_closed_0 to u_closed_8:
+// displacements, longer sides, and of what is undone the part, 0-1, in the third component; u_window, u_second_window,
+// u_third_window: left, top, width and height that the submaps cover, u_picture: width and height of the picture, u_limits:
+// left, top, right, bottom, longer sides; u_images, u_second_images, u_third_images: what lies beyond the windows' sides,
+// u_edges, u_edges_0 to u_edges_8: beyond the picture's, of A and of closed maps, as in lib/displacement.glsl; all are 0 if
+// something has crossed the edges.
 // Define HELD if something is frozen, for u_held and u_kept, over A's texels: see is_held. Define WEIGHED for the submaps
 // that are carried less and less before that, 1, 2 and 4 or their sum, and FADED: see weight.
 #include "lib/displacement.glsl"
@@ -133,6 +134,9 @@ vec3 in_window(vec4 window, vec2 x) {
     return vec3(across, inside.x * inside.y);
 }
 
+// Of what a submap is read from: its differences lie below it.
+vec2 cells_of(sampler2D submap) { return vec2(textureSize(submap, 0)) * vec2(1.0, 0.5); }
+
 // The part w of what a submap moves at x, 0-1, with its slopes along x and y, texels of A: a spline times a weight that is
 // zero on a border is zero there too, continuously (Kantorovich and Krylov). w is 0 where the map is held and 1 from a cell
 // of the submap on, or FADED texels: equation (S7).
@@ -144,7 +148,7 @@ float weight(int level, sampler2D submap, vec4 window, vec2 x, out vec2 slope) {
     vec4 at = vec4(texel + 0.5, texel + 1.5) / size.xyxy;
     vec4 far = max(127.0 - 255.0 * vec4(texture(u_held, at.xy).r, texture(u_held, at.zy).r,
                                         texture(u_held, at.xw).r, texture(u_held, at.zw).r), 0.0);
-    vec2 cell = window.zw / vec2(textureSize(submap, 0)) * size / u_picture, along = mix(far.xz, far.yw, f.x);
+    vec2 cell = window.zw / cells_of(submap) * size / u_picture, along = mix(far.xz, far.yw, f.x);
     float over = clamp(max(cell.x, cell.y), 1.0, float(FADED)), part = clamp(mix(along.x, along.y, f.y) / over, 0.0, 1.0);
     slope = 2.0 * (1.0 - part) / over * vec2(mix(far.y - far.x, far.w - far.z, f.y), along.y - along.x);
     return part * (2.0 - part);
@@ -159,7 +163,7 @@ float weight(int level, sampler2D submap, vec4 window, vec2 x, out vec2 slope) {
 vec2 displacement_of(int level, sampler2D submap, vec4 window, vec4 images, vec2 x) {
     vec2 slope;
     vec3 at = in_window(window, x);
-    vec2 moved = cubic_displacement(submap, at.xy * vec2(textureSize(submap, 0)), abs(u_edges) * images);
+    vec2 moved = bent_displacement(submap, at.xy * cells_of(submap), images);
     return moved * at.z * weight(level, submap, window, x, slope);
 }
 

@@ -7,7 +7,7 @@
 // Define KEEP (with REMAP) to draw only what is newly held: where u_now, whose first texel is u_corner, is 1/2 or more, and
 // u_before, over the picture, is not.
 // Define FROM for W(x + P(x)) - x: u_from (P), texel for texel, longer sides.
-// reads: 48, and 24 with CUBIC, 16 with LINEAR, 12 with GATHER; 12 more for each of LEVELS above 1, 4 for each
+// reads: 44, and 20 with CUBIC, 12 with LINEAR, 8 with GATHER; 8 more for each of LEVELS above 1, 4 for each
 // of WEIGHED, and for each of CLOSED as many as A takes
 #include "lib/warp.glsl"
 #include "lib/place.glsl"

@@ -5,7 +5,7 @@
 // x: see lib/place.glsl.
 // largest: (-det J, det J, |D|), to be reduced to the largest of each;
 // total: (1 where det J <= 0, |D|, |det J - 1|), to be reduced to their sums.
-// reads: 32, and 16 more for each of LEVELS above 1 and of CLOSED, 4 for each of WEIGHED; twice that with PART
+// reads: 24, and 8 more for each of LEVELS above 1, 16 of CLOSED, 4 for each of WEIGHED; twice that with PART
 #include "lib/warp.glsl"
 #include "lib/place.glsl"
 #include "lib/jacobian.glsl"

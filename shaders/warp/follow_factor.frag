@@ -2,7 +2,7 @@
 // u_factor (F): over the whole picture, longer sides; u_moved (P): texel for texel, or 0 with FIRST; u_amount (a);
 // u_picture: its width and height, longer sides; u_edges: see lib/warp.glsl; x: see lib/place.glsl.
 // Define SUBMAP for the factor to be led by, at each of its texels, what has moved since: u_submap on the window u_window.
-// reads: 13, and 12 more with SUBMAP
+// reads: 13, and 8 more with SUBMAP
 #include "lib/warp.glsl"
 #include "lib/place.glsl"
 uniform sampler2D u_factor;

@@ -2,7 +2,7 @@
 // sides); det J; and the same with what becomes of the area between the next texels of what a remap draws anew, which keeps
 // what is at its texels only: see Bend.
 // x: see lib/place.glsl.
-// reads: 48, and 28 more for each of LEVELS above 1, 16 of CLOSED, 4 for each of WEIGHED
+// reads: 28, and 8 more for each of LEVELS above 1, 16 of CLOSED, 4 for each of WEIGHED
 #include "lib/place.glsl"
 #include "lib/jacobian.glsl"
 layout(location = 0) out vec4 out_strain;

@@ -135,8 +135,9 @@ class Factors:
         levels = [submap]
         known = {} if held is None else {"held": held}
         follow = self.device.pass_("warp/follow_factor.frag", FIRST=1, SUBMAP=1, **defines_of(levels))
+        inputs = inputs_of(self.device, levels, edges, known)
         place: dict[str, Any] = {"origin": (0.0, 0.0), "step": target.texel, "edges": edges}
-        follow(target, factor=self._open.read, amount=1.0, picture=self.picture, **inputs_of(levels, known), **place)
+        follow(target, factor=self._open.read, amount=1.0, picture=self.picture, **inputs, **place)
 
     def _left(self, factor: Field) -> float:
         """What is left of its least det J where it is scaled; waits for the GPU."""

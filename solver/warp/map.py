@@ -111,7 +111,7 @@ class WarpMap:
     @property
     def submap(self) -> Level:
         """What has moved since the last remap."""
-        return Level(self._submap.read, self.grid, self._is_weighed, self._submap.images)
+        return self._submap.level(self._is_weighed)
 
     @property
     def held(self) -> Field | None:
@@ -306,6 +306,7 @@ class WarpMap:
         """Back to the identity."""
         self._remapping.drop()
         self._submap.read.clear()
+        self._submap.changed()
         self._accumulated.clear()
         self.factors.clear()
         self._steps = 0
@@ -401,6 +402,7 @@ class WarpMap:
             self._submap.release()
             self._submap = Submap(self.device, grid)
         self._submap.read.copy_from(state.fields["submap"])
+        self._submap.changed()
         self._submap.images = images["submap"]
         self._steps = int(state.values["steps"])
         self._is_settled = bool(state.values["settled"])
@@ -651,7 +653,7 @@ class WarpMap:
 
     def _parts(self) -> dict[str, Any]:
         """What `lib/warp.glsl` puts together."""
-        return self._accumulated.inputs() | inputs_of(self._levels, self._frozen.inputs())
+        return self._accumulated.inputs() | inputs_of(self.device, self._levels, self.edges, self._frozen.inputs())
 
     def _changed(self) -> None:
         self.version += 1

@@ -77,16 +77,16 @@ class Remapping:
                 self._take_in(1.0)  # then what is gathered is pending
         if self._pending is not None:
             self._gather(submap, is_weighed)
-        elif self._stand_by(Level(submap.read, submap.grid, is_weighed, submap.images)):
+        elif self._stand_by(submap.level(is_weighed)):
             submap.replace()
 
     def settle(self) -> None:
         """Fix the weights of the pending level as they are now, before the mask changes."""
         if self._pending is not None and self.is_weighed:
             coarse, fine = self._pending, self._resampled([self._pending])
-            coarse.field.release()
+            coarse.release()
             if not self._stand_by(fine, self._done):
-                fine.field.release()
+                fine.release()
                 self._go_on()
 
     def finish(self) -> None:
@@ -102,7 +102,7 @@ class Remapping:
     def drop(self) -> None:
         """Drop all levels."""
         for level in self.levels:
-            level.field.release()
+            level.release()
         self._gathered = self._pending = None
 
     # -- its state --------------------------------------------------------------------------------------------------
@@ -128,8 +128,9 @@ class Remapping:
         self.drop()
         copies = {}
         for name, level in saved.items():
-            copies[name] = level._replace(field=self.device.field(level.field.size, 2, f"{name} submap"))
-            copies[name].field.copy_from(level.field)
+            copied = self.device.field(level.field.size, 2, f"{name} submap")
+            copied.copy_from(level.field)
+            copies[name] = Level(copied, level.grid, level.is_weighed, level.images)
         self._gathered, pending = copies.get("gathered"), copies.get("pending")
         if pending is not None:
             self._stand_by(pending, progress)
@@ -152,24 +153,25 @@ class Remapping:
 
     def _gather(self, submap: Submap, is_weighed: bool) -> None:
         """Add a submap to the gathered level; the first one is that level, unless its weights have to be fixed."""
-        before, level = self._gathered, Level(submap.read, submap.grid, is_weighed, submap.images)
+        before, level = self._gathered, submap.level(is_weighed)
         if before is None and not is_weighed:
             self._gathered = level
             submap.replace()
             return
         self._gathered = self._resampled([level] if before is None else [level, before])
         submap.read.clear()
+        submap.changed()
         if before is not None:
-            before.field.release()
+            before.release()
 
     def _join(self) -> None:
         """Make what is gathered and what is pending, on one grid, a single pending level, taken in from its start."""
         levels, self._gathered, self._pending = self.levels, None, None
         joined = self._resampled(levels)
         for level in levels:
-            level.field.release()
+            level.release()
         if not self._stand_by(joined):
-            joined.field.release()
+            joined.release()
 
     def _resampled(self, levels: list[Level]) -> Level:
         """The composition of levels of one grid, with several texels a cell."""
@@ -184,7 +186,7 @@ class Remapping:
         compose(
             field,
             **self._accumulated.own(),
-            **inputs_of(levels, self._frozen.inputs()),
+            **inputs_of(self.device, levels, self._accumulated.edges, self._frozen.inputs()),
             origin=origin,
             step=fractions,
         )
@@ -198,19 +200,20 @@ class Remapping:
         if not self._draw_anew([self._pending], (part - begun) / (1 - begun)):
             self._stand_by(self._pending)
         elif part >= 1:
-            self._pending.field.release()
+            self._pending.release()
             self._go_on()
 
     def _go_on(self) -> None:
         """Make the gathered level, if there is one, the pending one."""
         gathered, self._gathered, self._pending = self._gathered, None, None
         if gathered is not None and not self._stand_by(gathered):
-            gathered.field.release()
+            gathered.release()
 
     def _draw_anew(self, levels: list[Level], part: float) -> bool:
         """Redraw a `part` of the accumulated map's tiles that are planned for these levels; False: see there."""
         fine = {"CUBIC": 1} if all(self._accumulated.is_fine(level.grid) for level in levels) else {}
-        inputs = self._accumulated.own() | inputs_of(levels, self._frozen.inputs())
+        accumulated, held = self._accumulated, self._frozen.inputs()
+        inputs = accumulated.own() | inputs_of(self.device, levels, accumulated.edges, held)
 
         def draw(target: Field, regions: list[Region], /, **undone: Any) -> None:
             # Also where it is held: places next to that may look into it, and it goes on from there once released.

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+from dataclasses import field as member
 from operator import mul
-from typing import Any, NamedTuple
+from typing import Any
 
 from solver.gl.device import Device
 from solver.gl.field import DoubleField, Field
@@ -14,8 +16,38 @@ from solver.trace import Tracing
 from solver.warp.frozen import FADED
 from solver.warp.state import GLIDING, OPEN, Images
 
-STEEPEST = 1.0  # largest |grad S| that the cubic carries well
+STEEPEST = 1.0  # largest |grad S| that the cubic carries well, by which a step reads it
 NAMES = "", "second_", "third_"  # of levels, in shaders
+
+
+class Differences:
+    """What a displacement is read from between its cells, drawn when it is asked for; see `warp/difference.frag`."""
+
+    def __init__(self) -> None:
+        self._drawn: Field | None = None
+        self._images: Images | None = None  # that it was drawn with; None if it is not drawn
+
+    def of(self, device: Device, displacement: Field, images: Images) -> Field:
+        """Of a displacement that is the same as last time, unless `forget` was called."""
+        width, height = displacement.size
+        if self._drawn is None:
+            self._drawn = Field(device, (width, 2 * height), 4, "differences", cleared=False)
+        if self._images != images:
+            for half in (0, 1):
+                draw = device.pass_("warp/difference.frag", **({"BENDS": 1} if half else {}))
+                draw(self._drawn, region=(0, half * height, width, height), displacement=displacement, images=images)
+            self._images = images
+        return self._drawn
+
+    def forget(self) -> None:
+        """Hear that the displacement has changed."""
+        self._images = None
+
+    def release(self) -> None:
+        """Free the texture."""
+        if self._drawn is not None:
+            self._drawn.release()
+        self._drawn = self._images = None
 
 
 class Submap(DoubleField):
@@ -36,6 +68,7 @@ class Submap(DoubleField):
         self.grid = grid
         self.trace = device.field(grid.size, 2, "submap, trace")
         self.images = GLIDING
+        self._differences = Differences()
         self._steepness = Steepness(device, grid.size, "submap")
 
     def advance(self, trace: Field | Tracing, is_walled: bool) -> None:
@@ -51,10 +84,21 @@ class Submap(DoubleField):
         advance(target, displacement=self.read, spacing=self.grid.spacing, **inputs)
         self.swap()
 
-    def replace(self) -> Field:
-        """What has moved, handed over; it begins anew with nothing."""
-        given, self.read = self.read, self.device.field(self.grid.size, 2, "submap")
-        return given
+    def level(self, is_weighed: bool) -> Level:
+        """What has moved, valid until it changes."""
+        return Level(self.read, self.grid, is_weighed, self.images, self._differences)
+
+    def replace(self) -> None:
+        """Hand over what has moved, as `level` had it; it begins anew with nothing."""
+        self.read, self._differences = self.device.field(self.grid.size, 2, "submap"), Differences()
+
+    def changed(self) -> None:
+        """Hear that `read` was drawn into."""
+        self._differences.forget()
+
+    def swap(self) -> None:
+        super().swap()
+        self.changed()
 
     @property
     def is_steep(self) -> bool:
@@ -63,28 +107,36 @@ class Submap(DoubleField):
 
     def release(self) -> None:
         super().release()
-        for part in (self.trace, self._steepness):
+        for part in (self.trace, self._steepness, self._differences):
             part.release()
 
 
-class Level(NamedTuple):
+@dataclass(frozen=True)
+class Level:
     """A submap and the grid it moved on: with a texel, or a whole number both ways, for each of its cells.
 
     Attributes:
         is_weighed: it moves less and less before what is held; see `lib/warp.glsl`.
         images: of the submap.
+        differences: what it is read from.
     """
 
     field: Field
     grid: Grid
     is_weighed: bool = False
     images: Images = GLIDING
+    differences: Differences = member(default_factory=Differences)
 
     @property
     def images_at_edges(self) -> Images:
         """What it says of what lies beyond the picture's edges: 0 of those that it does not reach."""
         left, right, top, bottom = map(mul, self.images, self.grid.at_edge)
         return left, right, top, bottom
+
+    def release(self) -> None:
+        """Free the textures."""
+        for thing in (self.field, self.differences):
+            thing.release()
 
 
 def window_of(grid: Grid) -> tuple[float, float, float, float]:
@@ -112,13 +164,16 @@ def defines_of(levels: list[Level]) -> dict[str, object]:
 
 def away_from_held(levels: list[Level]) -> list[Level]:
     """Levels as they are where nothing is held: there the uppermost moves in full; those below it look elsewhere."""
-    return [levels[0]._replace(is_weighed=False), *levels[1:]]
+    return [replace(levels[0], is_weighed=False), *levels[1:]]
 
 
-def inputs_of(levels: list[Level], held: dict[str, Any]) -> dict[str, Any]:
-    """Levels, the uppermost first, and what is held as `lib/warp.glsl` has them."""
+def inputs_of(device: Device, levels: list[Level], edges: Images, held: dict[str, Any]) -> dict[str, Any]:
+    """Levels, the uppermost first, between the edges of a map, and what is held as `lib/warp.glsl` has them."""
     parts = dict(held)
     for name, level in zip(NAMES, levels, strict=False):
-        field = name.removesuffix("_") or "submap"
-        parts |= {field: level.field, f"{name}window": window_of(level.grid), f"{name}images": level.images}
+        there = name.removesuffix("_") or "submap"
+        left, right, top, bottom = (abs(edge) * image for edge, image in zip(edges, level.images, strict=True))
+        images = left, right, top, bottom
+        parts[there] = level.differences.of(device, level.field, images)
+        parts |= {f"{name}window": window_of(level.grid), f"{name}images": images}
     return parts

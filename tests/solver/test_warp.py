@@ -82,6 +82,34 @@ def test_composition_agrees_with_float64(device: Device, size: tuple[int, int]) 
     assert difference(warp.read(), before) < 0.1
 
 
+@pytest.mark.parametrize("slip", ["free", "none"])
+@pytest.mark.parametrize("size", [(37, 23), (8, 8), (16, 51)])
+def test_a_submap_is_read_between_its_cells_as_in_float64(
+    device: Device, size: tuple[int, int], slip: Literal["free", "none"]
+) -> None:
+    """Up to the edges, beyond which it goes on as its image; and its slopes are those of what is read."""
+    grid = Grid(*size)
+    fluid, warp = Fluid(device, grid, FluidParams(walls=Walls(slip))), WarpMap(device, grid)
+    warp.follow(fluid, 0.01)  # at rest: from now on there is something to read
+    submap = smooth(np.random.default_rng(5), size, 0.5 * grid.h)
+    warp.submap.field.set(submap)
+    points = np.random.default_rng(6).uniform(1e-3, np.array(grid.extent) - 1e-3, (500, 2))
+    side = 1 if slip == "free" else -1
+
+    def read(at: np.ndarray) -> np.ndarray:
+        moved = reference.bent_displacement(submap, at[:, 0] / grid.h, at[:, 1] / grid.h, (side, side, side, side))
+        return np.clip(at + moved, 0, grid.extent) - at
+
+    assert difference(warp.at(points), read(points)) < 1e-5
+    bare = (np.abs(points + read(points) - np.divide(grid.extent, 2)) < np.divide(grid.extent, 2) - 1e-3).all(axis=1)
+    step = 1e-6 * grid.h
+    across, down = ((read(points + ahead) - read(points - ahead)) / (2 * step) for ahead in step * np.eye(2))
+    slopes = np.linalg.det(np.stack([across, down], axis=-1) + np.eye(2))
+    np.testing.assert_allclose(warp.determinants(points)[bare], slopes[bare], atol=1e-4)
+    for thing in (fluid, warp):
+        thing.release()
+
+
 def test_vortex_comes_back(device: Device) -> None:
     """The single vortex in a box, T = 8, 128 x 128, CFL 1."""
     grid = Grid(128, 128)
@@ -1387,7 +1415,7 @@ def test_where_nothing_moves_a_remap_draws_and_copies_nothing(device: Device) ->
         device.timings.take()
         with device.stage("step"):
             warp.remap()
-        drawn.append(round(device.timings.texel_writes["step"] / TILE**2))
+        drawn.append(int(device.timings.texel_writes["step"] / TILE**2))  # beside them are coarse fields, less than one
     a_quarter = 25  # of 100 tiles
     assert drawn == [a_quarter, 2 * a_quarter, a_quarter]
 

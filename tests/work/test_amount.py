@@ -50,7 +50,7 @@ def at_end(device: Device, recipe: Recipe) -> Replay:
 
 def looked_at(device: Device, part: ScaledMap) -> MapStatistics:
     """How it distorts between the texels that it is drawn on."""
-    nothing, field = device.field((8, 8), 2, "no submap"), part.composed(exact=True)
+    nothing, field = device.field((8, 16), 4, "no submap, and its differences"), part.composed(exact=True)
     limits = (0.0, 0.0, *part.extent)
     parts = {"submap": nothing, "window": limits, "picture": part.extent, "accumulated": field, "limits": limits}
     found = distortion(device, field.size, {}, parts)
