@@ -143,7 +143,7 @@ class Brush:
         paint, tip = self.device.pass_(motion.shader, **({"ATTENUATED": 1} if attenuation else {})), motion.tip
         inputs: dict[str, Any] = motion.inputs() | {"motion": self._motion, "gain": gain} | (attenuation or {})
         if isinstance(motion, Push):
-            inputs |= self._slip.inputs() | {"scaling": self._slip.scaling}
+            inputs |= self._slip.inputs() | {"scaling": self._slip.scaling, "hold": motion.hold}
 
         def draw(target: Field, only: int | None = None) -> None:
             tip.draw(paint, target, fluid.grid, motion.vectors, only, add=True, **inputs)
