@@ -59,7 +59,7 @@ class BrushPath(Model):
         symmetry: it acts again on the other sides of the picture's middle: "left-right" and "up-down" mirror it, "both"
             does both, "radial" turns it about the middle.
         sectors: how many times a radial one acts in all.
-        hold: of a push: 0 slips by what it has carried and stretched already, 1 carries as far as it goes.
+        hold: of a push: 0 slips by what it has carried and stretched already, 1 carries on; see `Push`.
         local: of a push: 0 pushes as a fluid does, which flows back beside the brush; 1 moves what is under it alone.
     """
 

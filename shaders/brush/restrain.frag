@@ -1,8 +1,8 @@
 // Restrain: by how much a push is scaled, into a texel for each image: not at all if the fluid under the brush is left with no
 // more than u_most times the energy of the brush's own flow at its own speed, else so that it just comes to that; a push that
 // brakes a faster fluid is allowed. Without it a brush drawn to and fro would pump up a fluid without viscosity without end,
-// since it looks at the middle alone.
-//   sum |v + scaling f P|^2 <= max(sum |v|^2, u_most V^2 sum |P|^2)   over the brush, P its flow along f = slip V - v(middle)
+// since it looks at two places alone.
+//   sum |v + scaling f P|^2 <= max(sum |v|^2, u_most V^2 sum |P|^2)   over the brush, P its flow along f = slip V - v(end)
 // u_velocity, u_impulse: MAC faces; u_motion: from probe; u_slip: from slip, in row u_row; u_velocities: the brush's, lengths / s;
 // u_strength; u_segments, u_radius, u_spacing: lengths.
 // reads: 787

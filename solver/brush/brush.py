@@ -33,7 +33,7 @@ class Brush:
 
     def __init__(self, device: Device) -> None:
         self.device = device
-        self._motion = device.field((MOST_IMAGES, 1), 4, "motion at the brush")
+        self._motion = device.field((MOST_IMAGES, 2), 4, "motion at the brush")
         self._obstruction = device.field((MOST_IMAGES, 1), 1, "obstruction factor")
         self._slip = Slip(device)
         self._distance = Distance(device)
@@ -118,8 +118,13 @@ class Brush:
             velocity=velocity,
             impulse=fluid.impulse.field,
             viscosity=fluid.viscosity,
-            region=(0, 0, len(tip.paths), 1),
-            at=for_images([((x - left) / hx, (y - top) / hy) for _, (x, y), _ in tip.paths]),
+            region=(0, 0, len(tip.paths), 2),
+            ends=for_images(
+                [
+                    ((a[0] - left) / hx, (a[1] - top) / hy, (b[0] - left) / hx, (b[1] - top) / hy)
+                    for a, b, _ in tip.paths
+                ]
+            ),
             reach=tuple(max(0.25 * tip.radius / h, 0.5) for h in (hx, hy)),
             spacing=(hx, hy),
         )
@@ -138,7 +143,7 @@ class Brush:
         paint, tip = self.device.pass_(motion.shader, **({"ATTENUATED": 1} if attenuation else {})), motion.tip
         inputs: dict[str, Any] = motion.inputs() | {"motion": self._motion, "gain": gain} | (attenuation or {})
         if isinstance(motion, Push):
-            inputs |= self._slip.inputs() | {"scaling": self._slip.scaling}
+            inputs |= self._slip.inputs() | {"scaling": self._slip.scaling, "hold": motion.hold}
 
         def draw(target: Field, only: int | None = None) -> None:
             tip.draw(paint, target, fluid.grid, motion.vectors, only, add=True, **inputs)

@@ -15,7 +15,8 @@ from solver.limits import check_finite, check_step, check_type
 from solver.warp.map import WarpMap
 
 # A push slips so that what it draws out does not become thinner than the map can resolve, where the map would fold. How
-# much it shall hold all the same is set (`Push.hold`): of each factor s of the first three laws it makes h + (1 - h) s.
+# much it shall hold all the same is set (`Push.hold`): h makes h + (1 - h) s of the factor s of the first law, and of
+# that of the second and third together; see (B3) of solver/README.md. The other laws do not give way to it.
 #
 # 1. By the brush's own path: it holds fast for FIRM radii, and in the end gives LOOSEST of its speed; one over a square
 #    in between. Else a long stroke would draw out what lay at its start into a thread.
@@ -30,16 +31,17 @@ SLIPPING, HELD_OFF = 4.0, 5.25
 # less for every radius that the fluid will coast, go on without the brush, after the first. Found, as all of these, by
 # making the same push again and again, with all feels and brushes of 9 to 20 cells: none folds, or hardly.
 BEGINNING, GAINING, COASTING = 0.68, 6.0, 3.0
-# A push gives no more speed than lets the fluid coast so many radii, beyond which the strain limit would leave nothing
-# of it, where what nothing slows down counts as coming to rest in so many seconds.
+
+# 4. By coasting: it gives no more speed than lets the fluid coast so many radii, beyond which the strain limit would
+#    leave nothing of it, where what nothing slows down counts as coming to rest in so many seconds.
 FARTHEST_COASTING, LONGEST_COASTING = 1.5, 1.0
 
-# 4. By energy: it gives nothing to a fluid that has, under the brush, so many times the energy of the brush's own flow.
+# 5. By energy: it gives nothing to a fluid that has, under the brush, so many times the energy of the brush's own flow.
 #    One stroke does not come there by itself, with any feel. Stirred for a minute without drag, a fluid moves at 7
 #    times the brush's speed without this law, and with it at less than twice in 99 of 100 cases (MEASURED.md).
 MOST_ENERGY = 1.5
 
-# 5. By time: in one step it carries what is under it no farther than its radius, however fast the tip is. A quicker tip
+# 6. By time: in one step it carries what is under it no farther than its radius, however fast the tip is. A quicker tip
 #    leaves behind what it cannot carry, as it does on a long path: in one step the jet that it makes would draw it out.
 LONGEST_STEP = 1.0
 
@@ -70,13 +72,13 @@ def coasting(tip: Tip, dt: float, drag: float, viscosity: float) -> float:
 
 
 def slip_factor(travelled: float, coasting: float = 0.0, hold: float = 0.0) -> float:
-    """The part of its speed that a push gives, `travelled` radii after its stroke began: the first law."""
+    """The part of its speed that a push gives, `travelled` radii after its stroke began: laws 1 and 4."""
     by_path = LOOSEST + (1 - LOOSEST) / (1 + 2 * max(travelled - FIRM, 0.0) ** 2)
     return (hold + (1 - hold) * by_path) * FARTHEST_COASTING / max(coasting, FARTHEST_COASTING)
 
 
 def quick_slip(tip: Tip) -> float:
-    """The most of its speed that a push gives whose tip goes its whole way in one step: the fifth law."""
+    """The most of its speed that a push gives whose tip goes its whole way in one step: the sixth law."""
     far = math.dist(tip.start, tip.end)
     return LONGEST_STEP * tip.radius / far if far else math.inf
 
@@ -104,9 +106,11 @@ class Push:
     """Carry the fluid under the tip along in `dt`; strength 1 moves it at the tip's own speed, negative against it.
 
     Attributes:
-        slip: the part of its own speed that the tip gives to the fluid; see `slip_factor`.
+        slip: the part of its own speed that the tip gives to the fluid, by what is known without looking at the map;
+            see `slip_factor` and `quick_slip`.
         strain_limit: the part of the most strain at which it slips; see `strain_limit`.
-        hold: from 0, where it slips by all that it has carried and stretched, to 1, where it does not for that.
+        hold: how little it slips by what it has carried and stretched: 0 all of that, 1 not at all. Its part in
+            `slip` is in there already.
         local: the part of its motion, 0-1, that carries what is under the tip and nothing else: the fluid does not feel
             it, and nothing flows back beside the brush; see `Brush.carry`.
 
@@ -177,7 +181,7 @@ class Slip:
         factor: the part of its speed that it gives, by what it has carried and stretched: the second and third law. A
             push has a row of it.
         row: that of the push that `find` was last asked for.
-        scaling: of what the fluid lacks, that it gives, by energy: the fourth.
+        scaling: the part that it gives of what the fluid lacks, by energy: the fifth.
     """
 
     def __init__(self, device: Device) -> None:

@@ -95,6 +95,23 @@ def test_a_push_that_holds_carries_the_picture_as_far_as_it_goes_and_folds_nothi
     assert whole == pytest.approx(6, rel=0.05)
 
 
+@pytest.mark.parametrize(("viscosity", "drag", "ticks"), [(0.3, 0.0, 12), (0.3, 0.0, 7), (0.03, 2.0, 12)])
+def test_a_quick_push_that_holds_carries_the_picture_too(
+    viscosity: float, drag: float, ticks: int, device: Device
+) -> None:
+    """Six radii at half a radius a tick, and at most of one: where a tick begins the fluid moves as its end will."""
+    radius, end = 0.05, 0.8
+    samples = tuple((tick, 0.5 + (end - 0.5) * tick / ticks, 0.5, 1.0) for tick in range(ticks + 1))
+    push = {"tool": "push", "hold": 1.0, "radius": radius, "samples": samples}
+    fluid = {"grid": 96, "dt": 1 / 30, "viscosity": viscosity, "drag": drag}
+    recipe = Recipe.model_validate({"fluid": fluid, "stroke": (push,)})
+    replay = Replay(device, recipe, Pictures(Picture(np.zeros((400, 600, 3), np.uint8))))
+    replay.seek(ticks + 1)
+    carried = float(-replay.warp.at(np.array([[end, 1 / 3]]))[0, 0]) / radius
+    assert carried == pytest.approx(6, rel=0.05)
+    replay.release()
+
+
 def test_a_push_of_a_radius_a_tick_folds_nothing(device: Device) -> None:
     """Along such a way the velocity changes so much that one step of the midpoint rule would press the map to lines."""
     push = {"tool": "push", "radius": 0.045, "samples": ((0, 0.78, 0.107, 1.0), (12, 0.883, 0.762, 1.0))}
