@@ -402,6 +402,53 @@ def test_a_handle_is_known_by_its_number_where_its_bar_has_no_room_for_its_name(
     assert (said, x < rect.right) == (words, is_inside)  # or on what it holds after it
 
 
+def test_keyframes_are_marks_on_the_bar_of_a_handle(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    handle = RecipeHandle(at=(0.4, 0.5), keys=(), turned=((1.0, 20.0, 1.0), (1.5, 0.0, 1.2), (4.0, 0.0, 1.0)))
+    session = robot.editor.session
+    session.edit("Handle", handle=(handle,), duration=8.0)
+    robot.rest()
+    robot.key("l")
+    robot.frame(count=2)
+    with monkeypatch.context() as noting:
+        drawn = Drawn(noting)
+        robot.frame()
+    rect, lines = place(robot, 0, "handle"), [line.split() for line in drawn.take()]
+    circles = [line for line in lines if line[0] == "add_circle_filled" and rect.y < float(line[2]) < rect.bottom]
+    marks = [float(line[1]) for line in circles if rect.x + 20 < float(line[1]) < rect.right]  # beside its icon
+    a_second = rect.width / 4  # from its start to its last keyframe
+    assert marks == pytest.approx([rect.x + a_second, rect.x + 1.5 * a_second, rect.right - 5], abs=1.5)
+    track = robot.editor.layout.timebar
+    thin = [line for line in lines if line[0] == "add_rect_filled" and float(line[2]) > track.y]
+    gaps = [float(line[1]) for line in thin if abs(float(line[3]) - float(line[1]) - 2) < 0.5][-3:]
+    begins = min(float(line[1]) for line in thin if float(line[3]) - float(line[1]) > 40)
+    assert [gaps[1] - gaps[0], gaps[2] - gaps[0]] == pytest.approx(
+        [(gaps[0] - begins) * 0.5, (gaps[0] - begins) * 3], abs=5
+    )
+
+
+def test_the_bar_of_a_handle_that_is_selected_on_the_picture_is_outlined(
+    robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    handles = tuple(RecipeHandle(at=(x, 0.5), to=(x + 0.1, 0.5)) for x in (0.3, 0.6))
+    robot.editor.session.edit("Handles", handle=handles, duration=8.0)
+    robot.rest()
+    robot.key("l")
+    outlined = dict[str, list[int]]()
+    for label in ("", "handle[2]", "handle[1]"):
+        robot.editor.state.selected = label
+        robot.frame(count=2)
+        with monkeypatch.context() as noting:
+            drawn = Drawn(noting)
+            robot.frame()
+        frames = [line.split()[1:5] for line in drawn.take() if line.startswith("add_rect ")]
+        places = [place(robot, number, "handle") for number in (0, 1)]
+        at = [[rect.x, rect.y, rect.right, rect.bottom] for rect in places]
+        outlined[label] = [
+            number for number in (0, 1) for frame in frames if [*map(float, frame)] == pytest.approx(at[number], abs=1)
+        ]
+    assert outlined == {"": [], "handle[2]": [1], "handle[1]": [0]}
+
+
 def many(count: int) -> tuple[Stroke, ...]:
     dice = random.Random(1)
     made = []

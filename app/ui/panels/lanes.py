@@ -228,7 +228,8 @@ def _bar(ui: Ui, session: Session, state: EditorState, bar: Bar, y: float, scale
     if drag is not None and drag.moved:
         taken = lanes.selected if drag.part == "move" else ()
         if bar.which == drag.bar.which or bar.which in taken:
-            bar = bar_of(lanes.dragged(one, drag, session.dt), bar.which, session.end, session.dt)
+            one = lanes.dragged(one, drag, session.dt)
+            bar = bar_of(one, bar.which, session.end, session.dt)
     left, right = scale.across(bar.start), scale.across(bar.end)
     right = max(right - ui.px(1), left + ui.px(NARROWEST - 2))
     low, high = ImVec2(left, y), ImVec2(right, y + ui.px(ROW))
@@ -244,7 +245,13 @@ def _bar(ui: Ui, session: Session, state: EditorState, bar: Bar, y: float, scale
     draw.add_rect_filled(low, high, packed(colour, faint), ui.px(4))
     if bar.which in lanes.selected:
         draw.add_rect(low, high, packed(palette.text), ui.px(4), ui.px(2))
+    elif state.selected and state.selected == _label(session, bar):  # on the picture
+        draw.add_rect(low, high, packed(palette.accent), ui.px(4), ui.px(2))
     ink = packed(palette.text if bar.muted else INK, 0.6 if bar.muted else 0.9)
+    if isinstance(one, RecipeHandle):
+        for time, *_ in one.turned:  # diamonds, as keyframes are everywhere
+            x = min(max(scale.across(time / session.dt), left + ui.px(5)), right - ui.px(5))
+            draw.add_circle_filled(ImVec2(x, high.y - ui.px(4)), ui.px(3.5), ink, 4)
     icon = "mute" if bar.muted else ICONS.get(kind, kind)
     icon = icon if icon in icons.PATHS else "force"
     is_numbered, room = isinstance(one, RecipeHandle | RecipePin), right - left - ui.px(10)

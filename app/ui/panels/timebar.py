@@ -160,7 +160,10 @@ def _handles(
     bottom: float,
     draw: imgui.ImDrawList,
 ) -> None:
-    """A bar for each handle and pin: bright while it is led, faint while it only holds; the selected one is white."""
+    """A bar for each handle and pin, bright while it is led, faint while it only holds.
+
+    The selected one is white; gaps are keyframes.
+    """
     recipe, dt = session.recipe, session.dt
     led = labelled(recipe.handle, recipe.pin)
     if not led:
@@ -175,3 +178,6 @@ def _handles(
         for until, alpha in ((end if one.end is None else one.end, 0.4), (last, 1.0)):
             high = ImVec2(max(across(until / dt), x + 2 * point), y + height)
             draw.add_rect_filled(ImVec2(x, y), high, packed(colour, alpha), point)
+        for time in [key[0] for key in one.turned] if isinstance(one, RecipeHandle) else ():
+            x = across(time / dt)  # a keyframe: a gap in its bar
+            draw.add_rect_filled(ImVec2(x - point, y), ImVec2(x + point, y + height), packed(ui.palette.ground))
