@@ -301,16 +301,20 @@ class Editor:
         if self.rehearsal.is_needed:
             self.rehearsal.go_on()
             return
+        is_full = False
         try:
             self.session.advance(self.clock.ticks(dt, self.session.dt, self.session.is_moving))
         except UserError as error:
             self.messages.warn(error.in_window)
         except GraphicsMemoryError:
+            is_full = True  # room is made below, as the error itself holds what was half made
+        if is_full:
             self.messages.warn(self.session.make_room())
 
     def _handle(self, events: Sequence[Event]) -> None:
         for event in events:
             self.clock.stir()
+            is_full = False
             try:
                 self._handle_one(event)
             except UserError as error:
@@ -318,6 +322,8 @@ class Editor:
                 tell = self.messages.caution if isinstance(event, (Button, Move)) else self.messages.warn
                 tell(error.in_window)
             except GraphicsMemoryError:
+                is_full = True
+            if is_full:
                 self.messages.warn(self.session.make_room())
 
     def _handle_one(self, event: Event) -> None:

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from threading import Event
+from weakref import WeakSet
 
 import moderngl
 import numpy as np
@@ -1816,13 +1817,16 @@ def test_where_the_graphics_memory_is_full_less_is_kept_and_nothing_lost(
     robot: Robot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A card with a little room beside what the simulation takes."""
-    session, living, most = robot.editor.session, list[moderngl.Texture](), 2**40
+    session, made, most = robot.editor.session, WeakSet[moderngl.Texture](), 2**40
+
+    def taken() -> int:
+        living = [texture for texture in made if not isinstance(texture.mglo, moderngl.InvalidObject)]
+        return sum(each.width * each.height * each.components * 4 for each in living)
 
     def limited(ctx: moderngl.Context, size: tuple[int, int], components: int, dtype: str) -> moderngl.Texture:
-        living[:] = [texture for texture in living if not isinstance(texture.mglo, moderngl.InvalidObject)]
         texture = new_texture(ctx, size, components, dtype)
-        living.append(texture)
-        if sum(each.width * each.height * each.components * 4 for each in living) > most:
+        made.add(texture)
+        if taken() > most:
             texture.release()
             raise GraphicsMemoryError
         return texture
@@ -1840,7 +1844,7 @@ def test_where_the_graphics_memory_is_full_less_is_kept_and_nothing_lost(
     robot.drag((0.3, 0.3), (0.6, 0.6), steps=4)
     robot.rest()
     session.replay.checkpoints.clear()
-    most = sum(each.width * each.height * each.components * 4 for each in living) + 2**19
+    most = taken() + 2**20
     full = "The graphics memory is full: less of the past is kept now, and going back takes longer."
     for number in range(20):
         robot.drag((0.7, 0.3), (0.2 + number / 40, 0.8), steps=4)
