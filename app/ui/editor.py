@@ -6,8 +6,9 @@ Long, as it makes all parts of the window, and says in which order they hear, ac
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import moderngl
@@ -301,30 +302,27 @@ class Editor:
         if self.rehearsal.is_needed:
             self.rehearsal.go_on()
             return
-        is_full = False
-        try:
-            self.session.advance(self.clock.ticks(dt, self.session.dt, self.session.is_moving))
-        except UserError as error:
-            self.messages.warn(error.in_window)
-        except GraphicsMemoryError:
-            is_full = True  # room is made below, as the error itself holds what was half made
-        if is_full:
-            self.messages.warn(self.session.make_room())
+        ticks = self.clock.ticks(dt, self.session.dt, self.session.is_moving)
+        self._attempt(lambda: self.session.advance(ticks), self.messages.warn)
 
     def _handle(self, events: Sequence[Event]) -> None:
         for event in events:
             self.clock.stir()
-            is_full = False
-            try:
-                self._handle_one(event)
-            except UserError as error:
-                # What the hand tries in vain is no state of the work, that somebody would have to take note of.
-                tell = self.messages.caution if isinstance(event, (Button, Move)) else self.messages.warn
-                tell(error.in_window)
-            except GraphicsMemoryError:
-                is_full = True
-            if is_full:
-                self.messages.warn(self.session.make_room())
+            # What the hand tries in vain is no state of the work, that somebody would have to take note of.
+            tell = self.messages.caution if isinstance(event, (Button, Move)) else self.messages.warn
+            self._attempt(partial(self._handle_one, event), tell)
+
+    def _attempt(self, act: Callable[[], None], tell: Callable[[str], None]) -> None:
+        """Do `act`, and `tell` what hinders it; a full graphics memory makes room."""
+        is_full = False
+        try:
+            act()
+        except UserError as error:
+            tell(error.in_window)
+        except GraphicsMemoryError:
+            is_full = True  # room is made below, as the error itself holds what was half made
+        if is_full:
+            self.messages.warn(self.session.make_room())
 
     def _handle_one(self, event: Event) -> None:
         match event:
