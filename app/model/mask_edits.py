@@ -16,7 +16,6 @@ from pydantic import Field, TypeAdapter, model_validator
 
 from app.model.areas import Area, Part, Seen, as_it_was
 from app.model.sampling import (
-    FINEST,
     ROWS_AT_ONCE,
     SOURCE,
     FrameNumber,
@@ -26,6 +25,7 @@ from app.model.sampling import (
     intensity,
     strips,
     to_grid,
+    workable,
 )
 from app.model.schema import Model, Radius, Several
 from app.model.strokes import BrushPath, Tick
@@ -205,8 +205,7 @@ def edited(
 ) -> np.ndarray:
     """A mask after an edit of all of it.
 
-    On a canvas above `FINEST` along its longer side, areas and the picture's own brightness are worked out on one of
-    that size, and interpolated.
+    On a large canvas, areas and the picture's own brightness are worked out on a `workable` one, and interpolated.
 
     Args:
         words: the mask's texels, (h, w), uint8 of what is frozen, uint16 of thickness.
@@ -220,7 +219,7 @@ def edited(
     """
     zero, unit = UNITS[edit.of]
     last = np.iinfo(words.dtype).max
-    grid = canvas if max(canvas.size) <= FINEST else Grid.for_picture(canvas.nx, canvas.ny, FINEST)
+    grid = workable(canvas)
 
     def wanted(amount: np.ndarray | float) -> np.ndarray:
         return np.clip(np.rint(zero + unit * np.asarray(amount)), 0, last)

@@ -22,7 +22,6 @@ from pydantic import Field, model_validator
 
 from app.errors import UserError
 from app.model.sampling import (
-    FINEST,
     SOURCE,
     NamedPictures,
     PictureName,
@@ -36,6 +35,7 @@ from app.model.sampling import (
     places,
     quantised,
     to_grid,
+    workable,
 )
 from app.model.schema import Fraction01, Model, Radius, Several, label_of
 from solver.grid import Grid
@@ -257,25 +257,22 @@ def viscosity(layers: Sequence[ViscosityLayer], base: float, grid: Grid, picture
     return result.astype(np.float32)
 
 
-def solid(layers: Sequence[FreezeLayer], grid: Grid, pictures: NamedPictures) -> np.ndarray:
-    """What is frozen on a grid or a canvas, (ny, nx) bool: nothing, with the layers on top, in order.
+def solid(layers: Sequence[FreezeLayer], canvas: Grid, pictures: NamedPictures) -> np.ndarray:
+    """What is frozen on a canvas, (ny, nx) bool: nothing, with the layers on top, in order.
 
-    On a canvas above `FINEST` along its longer side it is worked out on one of that size, and its edge interpolated.
+    On a large canvas it is worked out on a `workable` one, and its edge interpolated.
 
     Raises:
         UserError: naming the layer by its index and name, and what is wrong with it.
     """
-    width, height = grid.size
-    if max(width, height) > FINEST:
-        coarse = solid(layers, Grid.for_picture(width, height, FINEST), pictures)
-        return to_grid(coarse.astype(np.float32), grid) >= 0.5
-    result = np.zeros((height, width), bool)
+    grid = workable(canvas)
+    result = np.zeros((grid.ny, grid.nx), bool)
     for number, layer in enumerate(layers, 1):
         try:
             result = layer.onto(result, layer.intensity(grid, pictures), layer.coverage(grid))
         except (ValueError, UserError) as error:
             raise UserError(f"{label_of('freeze', number, layer.name)}: {error}") from None
-    return result
+    return result if grid is canvas else to_grid(result.astype(np.float32), canvas) >= 0.5
 
 
 def _mixed(below: np.ndarray, above: np.ndarray, weight: np.ndarray) -> np.ndarray:

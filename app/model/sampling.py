@@ -127,6 +127,13 @@ def to_grid(values: np.ndarray, grid: Grid) -> np.ndarray:
     return _resized(_resized(values, grid.nx, 1), grid.ny, 0).astype(np.float32)
 
 
+def workable(canvas: Grid) -> Grid:
+    """A canvas, or above `FINEST` cells along its longer side the grid of about that many in its place."""
+    if max(canvas.size) <= FINEST:
+        return canvas
+    return Grid(*Grid.for_picture(*canvas.size, FINEST).size, canvas.extent, canvas.origin, canvas.picture)
+
+
 def strips(values: np.ndarray, grid: Grid) -> Iterator[tuple[slice, np.ndarray]]:
     """The rows of a grid a few at a time, each time with `values` (h, w) of no more cells interpolated to them.
 

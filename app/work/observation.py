@@ -30,14 +30,14 @@ def observe(replay: Replay, sentinel: Sentinel) -> Observation:
 def whereabouts(warp: WarpMap, points: np.ndarray) -> np.ndarray:
     """Where points (n, 2) of the original are now, both in longer sides: float64 (n, 2).
 
-    By Newton's method, from the cell of the simulation that is looked up nearest to each.
+    By Newton's method, from the cell of the simulation that is looked up nearest to each, or from one of fewer places.
     """
     if not len(points):
         return np.zeros((0, 2))
-    (across, down), (width, height) = warp.coarse_size, warp.extent
+    (across, down), (width, height) = warp.bounded(warp.coarse_size), warp.extent
     x, y = (np.arange(across) + 0.5) / across * width, (np.arange(down) + 0.5) / down * height
     cells = np.stack(np.meshgrid(x, y), axis=-1)
-    looked_up = cells + warp.read()
+    looked_up = cells + warp.read((across, down))
     nearest = [((looked_up - point) ** 2).sum(axis=-1).argmin() for point in points]
     a_cell = np.full(len(points), np.hypot(width / across, height / down))
     found, _ = warp.seek(points, cells.reshape(-1, 2)[nearest], a_cell)

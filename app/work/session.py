@@ -81,8 +81,8 @@ class Session(Playing):
 
     @property
     def folds(self) -> tuple[int, int]:
-        """In how many places the warp folds over itself as it is seen at this moment, and of how many, two a cell along
-        each axis.
+        """In how many places the warp folds over itself as it is seen at this moment, and of how many: two a cell along
+        each axis, or as many as an export looks at.
 
         Reads back from the GPU; an export, which may take longer, looks at more of them.
         """

@@ -36,9 +36,10 @@ BEGINNING, GAINING, COASTING = 0.68, 6.0, 3.0
 #    leave nothing of it, where what nothing slows down counts as coming to rest in so many seconds.
 FARTHEST_COASTING, LONGEST_COASTING = 1.5, 1.0
 
-# 5. By energy: it gives nothing to a fluid that has, under the brush, so many times the energy of the brush's own flow.
-#    One stroke does not come there by itself, with any feel. Stirred for a minute without drag, a fluid moves at 7
-#    times the brush's speed without this law, and with it at less than twice in 99 of 100 cases (MEASURED.md).
+# 5. By energy: it leaves the fluid under the brush with no more than so many times the energy of the brush's own flow,
+#    or than it has already. One stroke does not come there by itself, with any feel. Stirred for a minute without drag,
+#    a fluid moves at 7 times the brush's speed without this law, and with it at less than twice in 99 of 100 cases
+#    (MEASURED.md).
 MOST_ENERGY = 1.5
 
 # 6. By time: in one step it carries what is under it no farther than its radius, however fast the tip is. A quicker tip

@@ -52,12 +52,13 @@ class Frozen:
             for k, n, of in zip((0, 1), self.size, mask.size, strict=True)
         )
         region = x, y, width, height = _grown((x, y, right - x, bottom - y), REACH, self.size)
-        rows = self.device.field((width, height + 2 * REACH), 1, "frozen, along x", "f1")
+        top, bottom = max(y - REACH, 0), min(y + height + REACH, self.size[1])  # beyond the map it is as on its edge
+        rows = self.device.field((width, bottom - top), 1, "frozen, along x", "f1")
         now = self.device.field((width, height), 1, "held now", "f1")
         along_x, along_y = (self.device.pass_("warp/hold.frag", **defines) for defines in ({"ALONG_X": 1}, {}))
         reach: dict[str, Any] = {"inner": float(INNER), "reach": float(REACH)}
-        along_x(rows, frozen=mask, offset=(x, y - REACH), size=self.size, **reach)
-        along_y(now, frozen=rows, offset=(0.0, REACH), size=rows.size, **reach)
+        along_x(rows, frozen=mask, offset=(x, top), size=self.size, **reach)
+        along_y(now, frozen=rows, offset=(0.0, y - top), size=rows.size, **reach)
         values = now.get()
         blocks = [(x + i, y + j, w, h) for i, j, w, h in _blocks_of((values > 0) & (held.get(region) < 128))]
         draw(kept, blocks, now, (x, y), held)

@@ -51,7 +51,7 @@ from solver.warp.state import (
 from solver.warp.submap import STEEPEST, Level, Submap, away_from_held, defines_of, images_of, inputs_of, window_of
 
 CHECK_EVERY = 2  # steps between two looks at how far the map is bent: a quick push bends it by 1 in two
-MOST_PLACES = 2**19  # at which its distortion is looked at
+MOST_PLACES = 2**19  # at which all of it is looked at, at most
 
 
 class WarpMap:
@@ -470,6 +470,15 @@ class WarpMap:
         across, down = (side / step for side, step in zip(self.extent, self.grid.spacing, strict=True))
         return round(across), round(down)
 
+    def bounded(self, size: tuple[int, int]) -> tuple[int, int]:
+        """The size of a lattice, or of one with a place for a whole number of its places: at most `MOST_PLACES`."""
+        width, height = size
+        stride = max(
+            math.ceil(math.sqrt(width * height / MOST_PLACES)),
+            math.ceil(max(size) / self.device.limits.max_texture_size),
+        )
+        return -(-width // stride), -(-height // stride)
+
     def read(self, size: tuple[int, int] | None = None) -> np.ndarray:
         """The displacement at the pixel centres of a picture of `size` (width, height), by default `coarse_size`.
 
@@ -580,13 +589,10 @@ class WarpMap:
     def statistics(self, size: tuple[int, int] | None = None, amount: float = 1.0) -> MapStatistics:
         """How the whole map distorts, measured on a lattice of `size`; waits for the GPU.
 
-        By default it has a place for each texel of the accumulated map, or for a whole number of texels if there would
-        be more than `MOST_PLACES`. `amount`: of the map, scaled as one displacement; see `ScaledMap`.
+        By default it has a place for each texel of the accumulated map; it is `bounded`. `amount`: of the map, scaled
+        as one displacement; see `ScaledMap`.
         """
-        if size is None:
-            width, height = self.size
-            stride = math.ceil(math.sqrt(width * height / MOST_PLACES))
-            size = -(-width // stride), -(-height // stride)
+        size = self.bounded(size or self.size)
         defines, parts = self._held_defines(), self._parts()
         if amount != 1:
             defines, parts = defines | {"PART": 1}, parts | {"amount": amount}

@@ -109,8 +109,8 @@ class ScaledMap:
         return draw_at(self.device, places(points), self.extent, "warp/resample.frag", displacement=field)
 
     def statistics(self, size: tuple[int, int] | None = None) -> MapStatistics:
-        """As `WarpMap.statistics`: of this part where something is held, else of the whole, which folds no less."""
-        return self.warp.statistics(size, 1.0 if self.warp.held is None else self.amount)
+        """As `WarpMap.statistics`: of this part where something is held or it is 0, else of all: no less folds."""
+        return self.warp.statistics(size, 1.0 if self.amount and self.warp.held is None else self.amount)
 
     def release(self) -> None:
         """Free the textures; the map stays."""

@@ -205,6 +205,16 @@ def test_freeze_layers_add_remove_and_replace(pictures: Pictures) -> None:
     assert solid([dark], GRID, pictures).mean() == pytest.approx(0.25, abs=0.02)
 
 
+@pytest.mark.parametrize("size", [(5000, 10), (10, 5000), (16384, 32)])
+def test_a_narrow_picture_is_frozen_where_it_is_said(pictures: Pictures, size: tuple[int, int]) -> None:
+    dot = freeze(kind="path", points=[[0.5, 0.5]], radius=0.01, hardness=1.0)
+    frozen = solid([dot], Grid(*size, (size[0] / max(size), size[1] / max(size))), pictures)
+    assert frozen.shape == size[::-1]
+    along = np.flatnonzero(frozen.any(axis=int(size[0] > size[1]) - 1))
+    assert len(along) == pytest.approx(0.02 * max(size), rel=0.1)
+    assert along.mean() == pytest.approx(max(size) / 2, abs=1)
+
+
 def test_a_segment_freezes(pictures: Pictures) -> None:
     band = freeze(kind="picture", segment={"above": 0.25, "below": 0.5})
     assert solid([band], GRID, pictures).mean() == pytest.approx(0.25, abs=0.03)

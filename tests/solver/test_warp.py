@@ -687,6 +687,18 @@ def test_what_is_held_is_found_where_the_mask_has_changed(device: Device, texels
         thing.release()
 
 
+def test_a_map_as_tall_as_a_texture_may_be_is_held_up_to_its_edges(device: Device) -> None:
+    tall = device.limits.max_texture_size
+    frozen, values = Frozen(device, (8, tall)), np.zeros((tall, 8), np.uint8)
+    values[0] = values[-1] = 255
+    mask = device.upload(values)
+    frozen.hold(mask, (0, 0, *mask.size), lambda *_: None)
+    assert frozen.held is not None
+    assert (np.flatnonzero(frozen.held.get()[:, 0] > 127) % tall).tolist() == [0, 1, 2, 3, *range(tall - 4, tall)]
+    for thing in (frozen, mask):
+        thing.release()
+
+
 def test_a_lattice_of_the_map_is_what_it_is_at_its_points(device: Device) -> None:
     """About what is held, far from it, and where it was thawed: also after going back, and on a lattice of a part."""
     grid, size, rng = Grid(64, 40), (320, 200), np.random.default_rng(8)

@@ -178,6 +178,18 @@ def test_what_is_frozen_keeps_every_bit_at_every_amount(device: Device) -> None:
     replay.release()
 
 
+def test_of_a_folded_warp_nothing_folds_at_no_amount(device: Device) -> None:
+    replay = at_end(device, TURNED)
+    y, x = np.mgrid[0:80, 0:120] / 120
+    replay.warp.set(np.stack([0.2 * np.sin(20 * x), 0 * y], axis=-1).astype(np.float32))
+    scaled = ScaledMap(replay.warp)
+    assert scaled.statistics().folds > 0
+    scaled.amount = 0.0
+    assert (scaled.statistics().folds, scaled.statistics().displacement_max) == (0, 0.0)
+    scaled.release()
+    replay.release()
+
+
 def test_a_part_that_folds_beside_what_is_frozen_is_told(device: Device, fluidwarp: Run, tmp_path: Path) -> None:
     """A half turn far from a frozen corner: where anything is frozen all is scaled in one, and half of it folds."""
     corner = Stroke(tool="freeze", radius=0.03, hardness=1.0, samples=((0, 0.04, 0.06, 1.0), (1, 0.04, 0.06, 1.0)))

@@ -13,7 +13,7 @@ from app.errors import UserError
 from app.media.auxiliary import Pictures
 from app.model.picture import Picture
 from app.model.recipe import FluidSettings, Recipe
-from app.model.strokes import Change, Sample, Stroke
+from app.model.strokes import FINEST_DETAIL, Change, Sample, Stroke
 from app.work.observation import whereabouts
 from app.work.replay import Replay
 from solver import energy
@@ -295,6 +295,20 @@ def test_a_point_is_followed(device: Device):
     places = whereabouts(replay.warp, points)
     assert (np.abs(places - points).sum(axis=-1)[:3] > 0.01).all()
     assert places[3] == pytest.approx(points[3], abs=1e-6), "a corner"
+    assert places + replay.warp.at(places) == pytest.approx(points, abs=1e-6)
+    replay.release()
+
+
+def test_a_point_is_followed_in_the_window_of_the_smallest_brush(device: Device) -> None:
+    """Cells as small all over the picture would be no texture."""
+    stroke = Stroke(tool="push", radius=0.0002, detail=FINEST_DETAIL, samples=((0, 0.5, 0.5, 1), (3, 0.5003, 0.5, 1)))
+    recipe = Recipe(stroke=(stroke,), fluid=FluidSettings(grid=32, viscosity=1.0, drag=12.0))
+    replay = Replay(device, recipe, pictures(), budget=0)
+    replay.seek(4)
+    assert replay.window is not None
+    points = np.multiply(((0.5003, 0.5), (0.1, 0.2)), replay.grid.extent)
+    places = whereabouts(replay.warp, points)
+    assert np.hypot(*(places[0] - points[0])) > 1e-5
     assert places + replay.warp.at(places) == pytest.approx(points, abs=1e-6)
     replay.release()
 

@@ -20,7 +20,7 @@ from app.model.handles import RecipeHandle
 from app.model.mask_edits import LONGEST_HAND, InvertMask, MaskStroke, mask_edit
 from app.model.presets import FEELS, HONEY, PUTTY, WATER, Feel
 from app.model.recipe import Recipe
-from app.model.strokes import BrushPath, Stroke
+from app.model.strokes import FINEST_DETAIL, BrushPath, Stroke
 from app.model.tools import TOOL, TOOLS, BrushSettings, Press
 from app.progress import Progress
 from app.work.export import run
@@ -30,6 +30,7 @@ from app.work.replay import Replay
 from app.work.session import Session
 from solver.gl.device import Device
 from solver.warp.distortion import MapStatistics
+from solver.warp.map import MOST_PLACES
 from support.editing import small_project
 from support.gl_objects import Made
 
@@ -63,6 +64,19 @@ def paint(
         session.move(start[0] + (end[0] - start[0]) * part, start[1] + (end[1] - start[1]) * part)
         session.advance(1)
     session.release()
+
+
+def test_what_a_small_brush_folds_is_looked_for_at_no_more_places_than_an_export_looks_at(session: Session) -> None:
+    """Two a cell of its window all over the picture were 17 million for a brush of a 200th, and no texture for less."""
+    session.begin_with(viscosity=1.0, drag=12.0)
+    stroke = Stroke(tool="push", radius=0.0002, detail=FINEST_DETAIL, samples=((0, 0.5, 0.5, 1), (3, 0.5003, 0.5, 1)))
+    session.edit("Push", stroke=(stroke,), duration=0.2)
+    session.seek(session.end)
+    session.settle()
+    assert session.replay.window is not None
+    folds, places = session.folds
+    assert folds == 0
+    assert MOST_PLACES / 4 < places <= MOST_PLACES
 
 
 @pytest.mark.parametrize(("limit", "most"), [("MOST_WORDS", 260), ("MOST_NUMBERS", 200)])
