@@ -198,6 +198,16 @@ def numbered_files(pattern: str | os.PathLike[str]) -> dict[int, Path]:
     return {number: folder / name for number, name in found}
 
 
+def is_there(path: str | os.PathLike[str]) -> bool:
+    """Whether there is a file of this name, or of a sequence any of its files."""
+    if not is_sequence(path):
+        return os.path.exists(path)
+    try:
+        return any(number_in(path, name) is not None for name in os.listdir(Path(path).parent))
+    except OSError:
+        return False
+
+
 def sequence_of(file: Path) -> Path:
     """The sequence that a file is of, by the last number in its name. Raises `UserError` if there is none in it."""
     found = re.search(r"[0-9]+(?=[^0-9]*$)", file.stem)
