@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Protocol, TypeVar
@@ -85,7 +86,7 @@ def animation_writer(
     *,
     cancel: Callable[[], bool] = never,
     passed: Callable[[int], None] = lambda frames: None,
-    written: Callable[[int], None] = lambda number: None,
+    written: Callable[[int, Path], None] = lambda number, file: None,
 ) -> Iterator[FrameWriter]:
     """Yield a function that appends a frame; the file appears when the block ends well, else nothing does.
 
@@ -97,16 +98,16 @@ def animation_writer(
         cancel: asked with each frame, and ten times a second while the encoder keeps us waiting; true raises
             `Cancelled`.
         passed: hears of frames that a later pass has gone through, after all were given, in formats with `passes`.
-        written: hears of each file of a sequence, by its number.
+        written: hears of each file of a sequence, by its number; see `sequence_writer`.
     """
     check_animation(path, fps / min(options.durations or [1]), options.codec)
     like, quality = options.like, 95 if options.quality is None else options.quality
     if is_sequence(path):
         template = like or Picture(np.empty((0, 0, 1), np.uint8))
 
-        def write_one(file: Path, frame: Frame) -> None:
+        def write_one(file: Path, frame: Frame, whole: Callable[[Path], None]) -> None:
             picture = frame if isinstance(frame, Picture) else template.with_pixels(frame)
-            write_picture(file, picture, bits=options.bits, quality=quality, codec=options.codec)
+            write_picture(file, picture, bits=options.bits, quality=quality, codec=options.codec, whole=whole)
 
         with sequence_writer(path, write_one, cancel, written, options.resumed) as write:
             yield write
@@ -351,16 +352,16 @@ def _gif_writer(
 @contextmanager
 def sequence_writer(
     path: str | os.PathLike[str],
-    write_one: Callable[[Path, T], None],
+    write_one: Callable[[Path, T, Callable[[Path], None]], None],
     cancel: Callable[[], bool] = never,
-    written: Callable[[int], None] = lambda number: None,
+    written: Callable[[int, Path], None] = lambda number, file: None,
     resumed: bool = False,
 ) -> Iterator[NumberedWriter[T]]:
-    """Yield a function that writes one numbered file by `write_one`, which lets it appear whole.
+    """Yield a function that writes one numbered file by `write_one`, which lets it appear whole; see `replacing`.
 
     Args:
         path: such as `name.%04d.png`; numbered from 0 where no number is given.
-        written: hears of each file, by its number.
+        written: hears of each file, by its number, and by its temporary name before it appears.
         resumed: there may be none left to write.
 
     Raises:
@@ -373,8 +374,7 @@ def sequence_writer(
         if cancel():
             raise Cancelled
         last = last + 1 if number is None else number
-        write_one(numbered(path, last), item)
-        written(last)
+        write_one(numbered(path, last), item, partial(written, last))
 
     yield write
     if last == -1 and not resumed:

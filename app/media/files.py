@@ -7,7 +7,7 @@ import os
 import re
 import shutil
 import stat
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
 from itertools import pairwise, product
@@ -342,19 +342,23 @@ def sync(path: Path) -> None:
 
 
 @contextmanager
-def replacing(path: str | os.PathLike[str], backup: Path | None = None) -> Iterator[Path]:
+def replacing(
+    path: str | os.PathLike[str], backup: Path | None = None, whole: Callable[[Path], None] = lambda file: None
+) -> Iterator[Path]:
     """Yield a temporary name beside `path`, which takes the place of `path` once the block has ended well.
 
     When the block raises, the temporary file goes and `path` is as it was. `OSError` becomes `UserError`.
 
     backup: where what `path` was is kept, instead of what was kept there; both outlast a power cut then, and at every
     moment there is a whole file under the name `path`.
+    whole: is called with the temporary file once it is written, as what is at `path` later may be another's.
     """
     target = writable(path)
     sweep(target.parent)
     try:
         with temporary_file(temporary_beside(target)) as temporary:
             yield temporary
+            whole(temporary)
             with suppress(OSError):  # who may read it stays as it was, if it is there and the disk knows of that
                 _hand_over(temporary, target.stat())
             if backup is not None:
