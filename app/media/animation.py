@@ -9,7 +9,7 @@ import errno
 import os
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import partial
@@ -26,7 +26,7 @@ from app.media.depth import to_bits
 from app.media.encoders import ANIMATIONS, SIX_BITS, Container, Encoding, Stream, check_animation, lossless
 from app.media.files import cannot_write, is_sequence, numbered, replacing, temporary_beside, temporary_file
 from app.media.pictures import write_picture
-from app.media.video import sound_tracks
+from app.media.video import begins_below_zero, sound_tracks
 from app.model.picture import Picture
 from app.progress import never
 
@@ -120,12 +120,14 @@ def animation_writer(
 
     container = ANIMATIONS[Path(path).suffix.lower()]
     rate = Fraction(fps).limit_denominator(100_000)
-    with replacing(path) as temporary:
+    with ExitStack() as stack:
+        temporary = stack.enter_context(replacing(path))
         if container.name == "GIF":
             with _gif_writer(temporary, str(path), rate, options, cancel, passed) as write:
                 yield lambda frame, number=None: write(straight(frame))
             return
-        given, sound = _sound(container, options, rate)
+        spool = stack.enter_context(temporary_file(temporary_beside(Path(path).with_suffix(".mka"))))
+        given, sound = _sound(container, options, rate, spool, cancel)
         if options.timecode is not None and container.sound:
             sound = [*sound, "-metadata", f"timecode={options.timecode}"]
         encoding, lasting, last = container.encoding(options.codec), options.durations, np.empty(0)
@@ -251,8 +253,13 @@ def _end_webp(file: Path, total: int) -> None:
             stream.write(min(max(1, total - before + own), 2**24 - 1).to_bytes(3, "little"))
 
 
-def _sound(container: Container, how: AnimationOptions, rate: Fraction) -> tuple[list[str], list[str]]:
-    """ffmpeg's input and output options that carry the sound of a file over."""
+def _sound(
+    container: Container, how: AnimationOptions, rate: Fraction, spool: Path, cancel: Callable[[], bool]
+) -> tuple[list[str], list[str]]:
+    """ffmpeg's input and output options that carry the sound of a file over; `spool` is for one without a usable clock.
+
+    Raises `UserError` or `Cancelled`.
+    """
     sound, start = how.sound, how.sound_from
     if sound is None or not container.sound:
         return [], []
@@ -260,6 +267,12 @@ def _sound(container: Container, how: AnimationOptions, rate: Fraction) -> tuple
     if not tracks:
         return [], []
     begin = ["-ss", f"{start:.6f}"] if start else []
+    if begins_below_zero(sound):
+        chosen = [word for place, _ in tracks for word in ("-map", f"0:a:{place}")]
+        ffmpeg.run(["-i", f"file:{sound}", *chosen, "-c", "copy", f"file:{spool}"], str(spool), cancel=cancel)
+        # With the pictures' own times, which begin at 0 now: the sound may begin later.
+        begin, sound = ["-ss", f"{start:.6f}", "-seek_timestamp", "1"], spool
+        tracks = list(enumerate(track for _, track in tracks))
     length = [] if how.frames is None else ["-t", f"{float(how.frames / rate):.6f}"]
     options = ["-map_chapters", "-1"]  # which belong to all of it: that they are not kept is told
     for number, (place, track) in enumerate(tracks):
