@@ -9,9 +9,10 @@ import errno
 import os
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Protocol, TypeVar
@@ -25,7 +26,7 @@ from app.media.depth import to_bits
 from app.media.encoders import ANIMATIONS, SIX_BITS, Container, Encoding, Stream, check_animation, lossless
 from app.media.files import cannot_write, is_sequence, numbered, replacing, temporary_beside, temporary_file
 from app.media.pictures import write_picture
-from app.media.video import sound_tracks
+from app.media.video import begins_below_zero, sound_tracks
 from app.model.picture import Picture
 from app.progress import never
 
@@ -85,7 +86,7 @@ def animation_writer(
     *,
     cancel: Callable[[], bool] = never,
     passed: Callable[[int], None] = lambda frames: None,
-    written: Callable[[int], None] = lambda number: None,
+    written: Callable[[int, Path], None] = lambda number, file: None,
 ) -> Iterator[FrameWriter]:
     """Yield a function that appends a frame; the file appears when the block ends well, else nothing does.
 
@@ -97,16 +98,16 @@ def animation_writer(
         cancel: asked with each frame, and ten times a second while the encoder keeps us waiting; true raises
             `Cancelled`.
         passed: hears of frames that a later pass has gone through, after all were given, in formats with `passes`.
-        written: hears of each file of a sequence, by its number.
+        written: hears of each file of a sequence, by its number; see `sequence_writer`.
     """
     check_animation(path, fps / min(options.durations or [1]), options.codec)
     like, quality = options.like, 95 if options.quality is None else options.quality
     if is_sequence(path):
         template = like or Picture(np.empty((0, 0, 1), np.uint8))
 
-        def write_one(file: Path, frame: Frame) -> None:
+        def write_one(file: Path, frame: Frame, whole: Callable[[Path], None]) -> None:
             picture = frame if isinstance(frame, Picture) else template.with_pixels(frame)
-            write_picture(file, picture, bits=options.bits, quality=quality, codec=options.codec)
+            write_picture(file, picture, bits=options.bits, quality=quality, codec=options.codec, whole=whole)
 
         with sequence_writer(path, write_one, cancel, written, options.resumed) as write:
             yield write
@@ -119,12 +120,14 @@ def animation_writer(
 
     container = ANIMATIONS[Path(path).suffix.lower()]
     rate = Fraction(fps).limit_denominator(100_000)
-    with replacing(path) as temporary:
+    with ExitStack() as stack:
+        temporary = stack.enter_context(replacing(path))
         if container.name == "GIF":
             with _gif_writer(temporary, str(path), rate, options, cancel, passed) as write:
                 yield lambda frame, number=None: write(straight(frame))
             return
-        given, sound = _sound(container, options, rate)
+        spool = stack.enter_context(temporary_file(temporary_beside(Path(path).with_suffix(".mka"))))
+        given, sound = _sound(container, options, rate, spool, cancel)
         if options.timecode is not None and container.sound:
             sound = [*sound, "-metadata", f"timecode={options.timecode}"]
         encoding, lasting, last = container.encoding(options.codec), options.durations, np.empty(0)
@@ -250,8 +253,13 @@ def _end_webp(file: Path, total: int) -> None:
             stream.write(min(max(1, total - before + own), 2**24 - 1).to_bytes(3, "little"))
 
 
-def _sound(container: Container, how: AnimationOptions, rate: Fraction) -> tuple[list[str], list[str]]:
-    """ffmpeg's input and output options that carry the sound of a file over."""
+def _sound(
+    container: Container, how: AnimationOptions, rate: Fraction, spool: Path, cancel: Callable[[], bool]
+) -> tuple[list[str], list[str]]:
+    """ffmpeg's input and output options that carry the sound of a file over; `spool` is for one without a usable clock.
+
+    Raises `UserError` or `Cancelled`.
+    """
     sound, start = how.sound, how.sound_from
     if sound is None or not container.sound:
         return [], []
@@ -259,6 +267,12 @@ def _sound(container: Container, how: AnimationOptions, rate: Fraction) -> tuple
     if not tracks:
         return [], []
     begin = ["-ss", f"{start:.6f}"] if start else []
+    if begins_below_zero(sound):
+        chosen = [word for place, _ in tracks for word in ("-map", f"0:a:{place}")]
+        ffmpeg.run(["-i", f"file:{sound}", *chosen, "-c", "copy", f"file:{spool}"], str(spool), cancel=cancel)
+        # With the pictures' own times, which begin at 0 now: the sound may begin later.
+        begin, sound = ["-ss", f"{start:.6f}", "-seek_timestamp", "1"], spool
+        tracks = list(enumerate(track for _, track in tracks))
     length = [] if how.frames is None else ["-t", f"{float(how.frames / rate):.6f}"]
     options = ["-map_chapters", "-1"]  # which belong to all of it: that they are not kept is told
     for number, (place, track) in enumerate(tracks):
@@ -351,16 +365,16 @@ def _gif_writer(
 @contextmanager
 def sequence_writer(
     path: str | os.PathLike[str],
-    write_one: Callable[[Path, T], None],
+    write_one: Callable[[Path, T, Callable[[Path], None]], None],
     cancel: Callable[[], bool] = never,
-    written: Callable[[int], None] = lambda number: None,
+    written: Callable[[int, Path], None] = lambda number, file: None,
     resumed: bool = False,
 ) -> Iterator[NumberedWriter[T]]:
-    """Yield a function that writes one numbered file by `write_one`, which lets it appear whole.
+    """Yield a function that writes one numbered file by `write_one`, which lets it appear whole; see `replacing`.
 
     Args:
         path: such as `name.%04d.png`; numbered from 0 where no number is given.
-        written: hears of each file, by its number.
+        written: hears of each file, by its number, and by its temporary name before it appears.
         resumed: there may be none left to write.
 
     Raises:
@@ -373,8 +387,7 @@ def sequence_writer(
         if cancel():
             raise Cancelled
         last = last + 1 if number is None else number
-        write_one(numbered(path, last), item)
-        written(last)
+        write_one(numbered(path, last), item, partial(written, last))
 
     yield write
     if last == -1 and not resumed:

@@ -59,16 +59,23 @@ class Ffmpeg:
 
     arguments: what follows `ffmpeg -y`.
     label: the file a failure is told about, with `doing` ("write", "read") as the verb.
+    level: what it tells, as by its own `-loglevel`.
     cancel: asked about ten times a second while ffmpeg keeps us waiting, in any thread; when true, `Cancelled` comes.
     """
 
     def __init__(
-        self, arguments: Sequence[str], label: str, *, doing: str = "write", cancel: Callable[[], bool] = never
+        self,
+        arguments: Sequence[str],
+        label: str,
+        *,
+        doing: str = "write",
+        cancel: Callable[[], bool] = never,
+        level: str = "error",
     ) -> None:
         self._label, self._doing, self._cancel = label, doing, cancel
         self._complaints = tempfile.TemporaryFile()  # noqa: SIM115 - closed in __exit__; a pipe could fill and block
         self._ending = ExitStack()
-        command = [executable(), "-hide_banner", "-nostats", "-loglevel", "error", "-y", *arguments]
+        command = [executable(), "-hide_banner", "-nostats", "-loglevel", f"+level+{level}", "-y", *arguments]
         with beginning():
             self._process = subprocess.Popen(
                 command,
@@ -165,8 +172,16 @@ class Ffmpeg:
 
     def complaint(self) -> str:
         """The first thing it has complained of, without a full stop; "" if nothing."""
-        lines = [re.sub(r"^(\[[^\]]*\] )+", "", line).strip() for line in self._said().splitlines() if line.strip()]
+        bad = re.findall(r"^(?:\[[^\]]*\] )*\[(?:error|fatal|panic)\] +(\S.*)", self._said(), re.MULTILINE)
+        lines = [re.sub(r"^(\[[^\]]*\] )+", "", line).strip() for line in bad]
         return lines[0].rstrip(".") if lines else ""  # the reason stands first, its consequences follow it
+
+    def sizes(self) -> list[str]:
+        """The sizes of the pictures that it has read, at the level "info", as 64 x 48, in the order of their coming."""
+        said = self._said()
+        first = re.findall(r"^\[info\] +Stream #0:.* Video: .*?, (\d+)x(\d+)", said, re.MULTILINE)[:1]
+        others = re.findall(r"Reconfiguring filter graph because video parameters changed to .*?, (\d+)x(\d+)", said)
+        return list(dict.fromkeys(f"{width} x {height}" for width, height in [*first, *others]))
 
     def failure(self) -> UserError:
         """What its complaints mean for the user."""

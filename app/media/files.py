@@ -7,7 +7,7 @@ import os
 import re
 import shutil
 import stat
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
 from itertools import pairwise, product
@@ -198,6 +198,16 @@ def numbered_files(pattern: str | os.PathLike[str]) -> dict[int, Path]:
     return {number: folder / name for number, name in found}
 
 
+def is_there(path: str | os.PathLike[str]) -> bool:
+    """Whether there is a file of this name, or of a sequence any of its files."""
+    if not is_sequence(path):
+        return os.path.exists(path)
+    try:
+        return any(number_in(path, name) is not None for name in os.listdir(Path(path).parent))
+    except OSError:
+        return False
+
+
 def sequence_of(file: Path) -> Path:
     """The sequence that a file is of, by the last number in its name. Raises `UserError` if there is none in it."""
     found = re.search(r"[0-9]+(?=[^0-9]*$)", file.stem)
@@ -332,19 +342,23 @@ def sync(path: Path) -> None:
 
 
 @contextmanager
-def replacing(path: str | os.PathLike[str], backup: Path | None = None) -> Iterator[Path]:
+def replacing(
+    path: str | os.PathLike[str], backup: Path | None = None, whole: Callable[[Path], None] = lambda file: None
+) -> Iterator[Path]:
     """Yield a temporary name beside `path`, which takes the place of `path` once the block has ended well.
 
     When the block raises, the temporary file goes and `path` is as it was. `OSError` becomes `UserError`.
 
     backup: where what `path` was is kept, instead of what was kept there; both outlast a power cut then, and at every
     moment there is a whole file under the name `path`.
+    whole: is called with the temporary file once it is written, as what is at `path` later may be another's.
     """
     target = writable(path)
     sweep(target.parent)
     try:
         with temporary_file(temporary_beside(target)) as temporary:
             yield temporary
+            whole(temporary)
             with suppress(OSError):  # who may read it stays as it was, if it is there and the disk knows of that
                 _hand_over(temporary, target.stat())
             if backup is not None:

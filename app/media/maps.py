@@ -102,15 +102,20 @@ def _tiff_holds(file: Path) -> Holds:
         return "either" if page.samplesperpixel == 3 else "picture"
 
 
-def write_map(path: str | os.PathLike[str], displacement: Displacement, kind: Kind = "st") -> None:
+def write_map(
+    path: str | os.PathLike[str],
+    displacement: Displacement,
+    kind: Kind = "st",
+    whole: Callable[[Path], None] = lambda file: None,
+) -> None:
     """Write a map, whole or not at all: .exr and .tif hold `kind` in 32 bits, with the convention in the metadata.
 
     .flo holds offsets in pixels, y down; .npy the displacement itself, (h, w, 2) float32. Neither tells its overscan,
-    so they are cut to the picture. Raises `UserError`.
+    so they are cut to the picture. For `whole` see `replacing`. Raises `UserError`.
     """
     check_map(path)
     suffix = Path(path).suffix.lower()
-    with replacing(path) as temporary:
+    with replacing(path, whole=whole) as temporary:
         if suffix in (".flo", ".npy"):
             displacement = cropped(displacement)
             with temporary.open("wb") as stream:
@@ -166,14 +171,14 @@ def map_writer(
     kind: Kind = "st",
     *,
     cancel: Callable[[], bool] = never,
-    written: Callable[[int], None] = lambda number: None,
+    written: Callable[[int, Path], None] = lambda number, file: None,
     resumed: bool = False,
 ) -> AbstractContextManager[NumberedWriter[Displacement]]:
     """A context that yields a function appending a map to the sequence `name.%04d.exr`; see `animation_writer`."""
     check_map(path)
 
-    def write_one(file: Path, displacement: Displacement) -> None:
-        write_map(file, displacement, kind)
+    def write_one(file: Path, displacement: Displacement, whole: Callable[[Path], None]) -> None:
+        write_map(file, displacement, kind, whole)
 
     return sequence_writer(path, write_one, cancel, written, resumed)
 

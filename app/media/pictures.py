@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -41,6 +42,7 @@ def write_picture(
     background: tuple[int, int, int] = (0, 0, 0),
     codec: str | None = None,
     dpi: float | None = None,
+    whole: Callable[[Path], None] = lambda file: None,
 ) -> None:
     """Write a picture in the format of the ending of `path`, whole or not at all.
 
@@ -51,6 +53,7 @@ def write_picture(
     codec: the compression of an EXR; None is zip.
     dpi: dots per inch along both sides; None keeps the picture's own, which may be none.
     background: what shows through where the format has no alpha.
+    whole: see `replacing`.
     Raises `UserError`.
     """
     check_picture_output(path, bits, (picture.width, picture.height), codec)
@@ -70,5 +73,5 @@ def write_picture(
     if not fits_profile(picture, chosen):
         picture = replace(picture, icc=None)
     assert chosen.write is not None
-    with replacing(path) as temporary:
+    with replacing(path, whole=whole) as temporary:
         chosen.write(temporary, picture, quality, **({} if codec is None else {"codec": codec}))

@@ -14,7 +14,7 @@ from typing import Any
 
 from app.errors import UserError, printable, shown
 from app.media.clip import WHOLE, Clip
-from app.media.files import is_sequence, name_from, numbered_files, replacing
+from app.media.files import check_kept, is_sequence, name_from, numbered_files, replacing
 from app.media.inputs import MAX_PIXELS, MOST_TEXT, Archive, cannot_read, open_input, read_input, state_of
 from app.media.leftovers import temporary_folder
 from app.media.recipes import read_recipe
@@ -280,6 +280,12 @@ def picture_names(recipe: Recipe) -> list[str]:
     """The names of all pictures of a recipe, its own first."""
     named = (value for key, value in _values(recipe) if isinstance(value, str) and key in PICTURE_KEYS)
     return list(dict.fromkeys([*filter(None, [recipe.picture]), *(name for name in named if name != SOURCE)]))
+
+
+def check_pictures_kept(recipe: Recipe, folder: Path, output: Path) -> None:
+    """Make sure that `output` takes the place of no picture that the recipe names from `folder`. Raises `UserError`."""
+    for name in picture_names(recipe):
+        check_kept(folder / name, output)
 
 
 def frame_numbers(recipe: Recipe) -> list[int]:

@@ -56,29 +56,29 @@ class Record:
         line = self._lines.get(number, "")
         with suppress(OSError, UserError):
             # A file of another size is not read: it may be one without end.
-            return self._size(number) == line.rpartition(" ")[2] and line == self._line(number)
+            file = numbered(self._pattern, number)
+            return _size(file) == line.rpartition(" ")[2] and line == self._line(number, file)
         return False
 
-    def add(self, number: int) -> None:
-        """Note that the file of this number was written. Raises `UserError`."""
+    def add(self, number: int, file: Path) -> None:
+        """Note that the file of this number is written, which is still `file`: another task may write it, too.
+
+        Raises `UserError`.
+        """
         try:
-            line = f"{number} {self._line(number)}\n".encode()
-            file = os.open(self._path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | ONLY_A_FILE, 0o666)
+            line = f"{number} {self._line(number, file)}\n".encode()
+            record = os.open(self._path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | ONLY_A_FILE, 0o666)
             try:
-                self._check(os.fstat(file))
+                self._check(os.fstat(record))
                 # a line that was cut by a full disk or a kill ends here
-                os.write(file, line if self._ends_whole() else b"\n" + line)
+                os.write(record, line if self._ends_whole() else b"\n" + line)
             finally:
-                os.close(file)
+                os.close(record)
         except OSError as error:
             raise cannot_write(self._path, error) from error
 
-    def _line(self, number: int) -> str:
-        file = numbered(self._pattern, number)
-        return f"{self._made_of(number)} {digest_of_file(file)} {self._size(number)}"
-
-    def _size(self, number: int) -> str:
-        return str(os.stat(numbered(self._pattern, number)).st_size)
+    def _line(self, number: int, file: Path) -> str:
+        return f"{self._made_of(number)} {digest_of_file(file)} {_size(file)}"
 
     def _ends_whole(self) -> bool:
         with self._path.open("rb") as stream:
@@ -96,6 +96,10 @@ class Record:
             number, _, made_of = line.partition(" ")
             if number.isdecimal() and len(number) < 19:
                 yield int(number), made_of
+
+
+def _size(file: Path) -> str:
+    return str(os.stat(file).st_size)
 
 
 def digest_of_file(path: Path) -> str:

@@ -122,7 +122,7 @@ class Video(FileClip):
         self._check_unchanged(begins=True)
         dtype = np.dtype(np.uint8 if self.bits == 8 else np.uint16)
         shape = self.height, self.width, channels
-        with ffmpeg.Ffmpeg(arguments, str(self.path), doing="read", cancel=cancel) as process:
+        with ffmpeg.Ffmpeg(arguments, str(self.path), doing="read", cancel=cancel, level="info") as process:
             count = first
             try:
                 for block in process.blocks(int(np.prod(shape)) * dtype.itemsize):
@@ -132,6 +132,9 @@ class Video(FileClip):
                 self._check_unchanged()
                 raise
             self._check_unchanged()
+            if len(sizes := process.sizes()) > 1:
+                shown = f"{self.width} x {self.height}"
+                notice(f"{self.path}: its frames are of {' and '.join(sizes)} pixels, and all become {shown}")
             if complaint := process.complaint():
                 notice(f"{self.path} is damaged, and what could be read of it was used (ffmpeg says: {complaint})")
             elif self.frames is not None and count < self.frames - max(2, self.fps):  # by more than a second
@@ -174,6 +177,7 @@ def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Vid
     if late:  # or the first frame would be shown from the sound's start on
         filters = _delayed(late) + filters
     width, height, fps = _shown(file, filters)
+    filters = re.sub(r"scale=iw(\*sar)?:ih", f"scale={width}:{height}", filters)  # should others follow
     colours, sounds = _colours(video), _sounds(told)
     check_size(file, width, height, max_pixels)
     seconds = _seconds(told)
@@ -193,7 +197,7 @@ def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Vid
         alpha=alpha,
         decoder=("-c:v", "libvpx-vp9") if hidden else (),
         filters=filters,
-        is_steady=abs(_shortest(video) - 1) < 0.02 and file.suffix.lower() in SEEKABLE,
+        is_steady=abs(_shortest(video) - 1) < 0.02 and file.suffix.lower() in SEEKABLE and not _is_early(told),
         note=lost(file, [*_losses(told, video, fps), *(_mastering(file) if colours.is_high else [])]),
         colours=colours,
         timecode=found[1] if (found := TIMECODE.search(told)) else None,
@@ -360,13 +364,22 @@ def _sounds(told: str) -> list[SoundTrack]:
 
 def _seconds(told: str) -> float | None:
     """How long a file is, from its start on, by ffmpeg's words; None if it does not say."""
-    length = re.search(r"Duration: (\d+):(\d+):([\d.]+)(?:, start: ([\d.]+))?", told)
+    length = re.search(r"Duration: (\d+):(\d+):([\d.]+)(?:, start: (-?[\d.]+))?", told)
     if length is None:
         return None
     seconds = int(length[1]) * 3600 + int(length[2]) * 60 + float(length[3])
     start = float(length[4] or 0)
     # Of a Matroska this is when it ends, which counts from 0 whenever it starts, as a recording that went on.
     return seconds - start if "Input #0, matroska" in told and seconds > start else seconds
+
+
+def begins_below_zero(path: str | os.PathLike[str]) -> bool:
+    """Whether the times of a file begin below 0: there ffmpeg seeks to somewhere else, or not at all."""
+    return _is_early(_banner(Path(path)))
+
+
+def _is_early(told: str) -> bool:
+    return re.search(r"Duration: .*, start: -", told) is not None
 
 
 def _late(told: str, video: str) -> float:

@@ -6,16 +6,20 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from math import floor
+from pathlib import Path
 
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
 from app.errors import UserError
+from app.media.inputs import state_of
 from app.ui.editor_state import EditorState
 from app.ui.preferences import Preferences
 from app.ui.viewport import Rect
 from app.ui.widgets import Ui
 from app.ui.workspace import Workspace
+
+EXISTS = "This file exists and will be replaced."
 
 
 class Dialog(ABC):
@@ -222,6 +226,25 @@ def beside(ui: Ui, left: float, right: float) -> None:
         imgui.same_line(start)
     else:
         imgui.set_cursor_pos_x(max(start, ui.px(24)))
+
+
+class Replaced:
+    """Tells that a file will be replaced: what a frame before has told of may be.
+
+    Attributes:
+        is_told: the file that is there now, if any, was told of before this frame.
+    """
+
+    def __init__(self) -> None:
+        self.is_told = True
+        self._told: tuple[Path, tuple[int, ...] | None] | None = None
+
+    def tell(self, ui: Ui, path: Path, said: str) -> None:
+        """Draw what is said of the file at `path`; "" if none is replaced."""
+        now = (path, state_of(path)) if said else None
+        self.is_told, self._told = now in (None, self._told), now
+        if said:
+            ui.wrapped(said, ui.palette.accent, 13)
 
 
 class Unsaved(Dialog):

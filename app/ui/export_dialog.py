@@ -6,7 +6,6 @@ Long, as the dialog holds a row for each setting; what can be chosen is in `expo
 
 from __future__ import annotations
 
-import os
 import tempfile
 from collections.abc import Callable
 from copy import deepcopy
@@ -23,16 +22,18 @@ from imgui_bundle.imgui import ImVec2
 from app.errors import UserError, printable
 from app.media.clip import WHOLE, FrameRange, rate_of
 from app.media.encoders import written_size
+from app.media.files import is_sequence, is_there
 from app.media.formats import FORMATS
 from app.media.leftovers import temporary_folder
 from app.media.pictures import read_picture
+from app.media.project import check_pictures_kept
 from app.model.handles import heading
 from app.model.recipe import Recipe
 from app.model.timeline import NEARLY, Timeline, steps_of
 from app.ui.canvas import shown_pixels
 from app.ui.chooser import FileChooser
 from app.ui.clipboard import Giving, check
-from app.ui.dialogs import Dialog, beside
+from app.ui.dialogs import EXISTS, Dialog, Replaced, beside
 from app.ui.export_choices import (
     ANIMATION,
     FILTERS,
@@ -99,6 +100,7 @@ class ExportDialog(Dialog):
         self._preview: ExportProcess | None = None
         self._image: moderngl.Texture | None = None
         self._folder: tempfile.TemporaryDirectory[str] | None = None
+        self._replaced = Replaced()
         self._named = self._proposed
         self.name = self._named if last is None or last.name is None else last.name
 
@@ -274,7 +276,7 @@ class ExportDialog(Dialog):
         imgui.same_line()
         with ui.enabled(self._can_start):
             if ui.button("Export", primary=True, width=96) or (self.entered and self._can_start):
-                return not self.attempt(self._start)
+                return not (self._replaced.is_told and self.attempt(self._start))
         return True
 
     def _ask(self, ui: Ui) -> None:
@@ -358,8 +360,9 @@ class ExportDialog(Dialog):
         if ui.button("Browse", width=96, height=27):
             self._chooser.ask_where("Export to", self.output, (self.ending,), self._chosen)
         ui.wrapped(str(self.output), ui.palette.dim, 13)
-        if os.path.exists(self.output):
-            ui.text("This file exists and will be replaced.", ui.palette.accent, 13)
+        several = "Files of this name exist, and those of the same numbers will be replaced."
+        said = several if is_sequence(self.output) else EXISTS
+        self._replaced.tell(ui, self.output, said if is_there(self.output) else "")
 
     def _choose(self, kind: int) -> None:
         """Take another kind; a name that is still the one proposed goes with it."""
@@ -418,6 +421,8 @@ class ExportDialog(Dialog):
         return bool(self.name.strip()) and not self._exports.is_running
 
     def _start(self) -> None:
+        session = self.session
+        check_pictures_kept(session.document.recipe, session.project.folder, self.output)
         self._exports.start(self.job())
         self._preferences.exported(self.output, self.choices.told)
         name = self.name if self.name != self._named else None

@@ -196,11 +196,13 @@ class Files:
         """Write a mask as a picture of 16 bits that `load_mask` reads back.
 
         Raises:
-            UserError: if nothing is painted on it, or the file cannot be written.
+            UserError: if nothing is painted on it, the work needs the file that is there, or it cannot be written.
         """
-        words = self.workspace.session.replay.masks.words(of)
+        session = self.workspace.session
+        words = session.replay.masks.words(of)
         if words is None:
             raise UserError("There is nothing on this mask to save.")
+        projects.check_pictures_kept(session.document.recipe, session.project.folder, path)
         write_picture(path, Picture(as_grey(words, of)[..., None]))
         thinned = of == "thickness" and words.min() < UNITS[of][0]
         self.messages.done(f"Saved {path.name}." + (" What is thinned is not in it." if thinned else ""))

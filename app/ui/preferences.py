@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import math
 import os
-from dataclasses import asdict, dataclass, field, fields
+from copy import deepcopy
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
 from app.errors import UserError, shown
+from app.media.files import temporary_beside, temporary_file
 from app.media.inputs import read_input
 from app.media.opening import shipped_recipes
 from app.ui.clipboard import pasted_folder
@@ -62,22 +64,28 @@ class Preferences:
     stabiliser: float = 0.0
     path: Path | None = field(default=None, compare=False)
 
+    def __post_init__(self) -> None:
+        self._kept = dict[str, Any]()  # the values when they were read or saved last
+
     @classmethod
     def load(cls) -> Preferences:
         """From the configuration folder; what is missing or broken there is as by default."""
         from platformdirs import user_config_path
 
-        path = user_config_path("fluidwarp") / "preferences.json"
+        return cls._of(user_config_path("fluidwarp") / "preferences.json")
+
+    @classmethod
+    def _of(cls, path: Path) -> Preferences:
         try:
             data: Any = json.loads(read_input(path, "file of preferences", MOST_BYTES))
         except (UserError, ValueError, RecursionError):
             data = {}
         kept = cls(path=path)
         if isinstance(data, dict):
-            for part in fields(cls):
-                value = data.get(part.name)
-                if part.name != "path" and isinstance(value, type(getattr(kept, part.name))):
-                    setattr(kept, part.name, value)
+            for name in cls._parts():
+                value = data.get(name)
+                if isinstance(value, type(getattr(kept, name))):
+                    setattr(kept, name, value)
         kept.theme = kept.theme if kept.theme in ("dark", "light") else "dark"
         kept.scale = min(max(kept.scale, 0.75), 3.0) if math.isfinite(kept.scale) else 1.0
         kept.recent = [str(name) for name in kept.recent][:MOST_RECENT]
@@ -90,18 +98,32 @@ class Preferences:
         kept.keys = {name: keys for name, keys in kept.keys.items() if isinstance(keys, list) and _can_be_shown(*keys)}
         kept.brushes = _numbers(kept.brushes)
         kept.presets = {name: brush for name, brush in _numbers(kept.presets).items() if _can_be_shown(name)}
+        kept._kept = kept._values()
         return kept
 
+    @classmethod
+    def _parts(cls) -> list[str]:
+        """The names of what is kept."""
+        return [part.name for part in fields(cls) if part.name != "path"]
+
+    def _values(self) -> dict[str, Any]:
+        return {name: deepcopy(getattr(self, name)) for name in self._parts()}
+
     def save(self) -> None:
-        """To the configuration folder, if it can be written."""
+        """To the configuration folder, if it can be written; what another window has changed there meanwhile stays."""
         if self.path is None:
             return
-        data = {key: value for key, value in asdict(self).items() if key != "path"}
+        mine, before = self._values(), self._kept
+        theirs = Preferences._of(self.path)._values() if before and self.path.exists() else mine
+        data = {name: _merged(before.get(name), mine[name], theirs[name]) for name in mine}
+        if mine["recent"] != before.get("recent"):
+            data["recent"] = list(dict.fromkeys([*mine["recent"][:1], *theirs["recent"], *mine["recent"]]))
+        self._kept = mine
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            temporary = self.path.with_suffix(".new")
-            temporary.write_text(json.dumps(data, indent=1), "utf-8")
-            temporary.replace(self.path)
+            with temporary_file(temporary_beside(self.path)) as temporary:
+                temporary.write_text(json.dumps(data, indent=1), "utf-8")
+                temporary.replace(self.path)
         except OSError:
             pass  # preferences are not worth a message
 
@@ -154,6 +176,15 @@ def _numbers(table: dict[str, Any]) -> dict[str, dict[str, float]]:
         name: {key: float(value) for key, value in row.items() if isinstance(value, kinds) and abs(value) < 1e9}
         for name, row in rows.items()
     }
+
+
+def _merged(before: Any, mine: Any, theirs: Any) -> Any:
+    """What is kept of a value: as it is here if that is not `before` any more, else as in the file; of a table each."""
+    if isinstance(mine, dict) and before is not None:
+        changed = {key: mine.get(key) for key in {*before, *mine} if key not in mine or before.get(key) != mine[key]}
+        kept = {key: value for key, value in theirs.items() if key not in changed}
+        return kept | {key: value for key, value in changed.items() if key in mine}
+    return theirs if mine == before else mine
 
 
 def _first_of(*folders: str) -> Path:

@@ -13,7 +13,7 @@ from app.errors import printable
 from app.media.project import SUFFIX, Project
 from app.ui.chooser import FileChooser
 from app.ui.clipboard import pasted_folder
-from app.ui.dialogs import Dialog
+from app.ui.dialogs import EXISTS, Dialog, Replaced
 from app.ui.preferences import Preferences
 from app.ui.widgets import Ui
 
@@ -56,6 +56,7 @@ class SaveDialog(Dialog):
         self._write = write
         self._then = then
         self._asks_name = True
+        self._replaced = Replaced()
 
     @property
     def path(self) -> Path:
@@ -86,11 +87,12 @@ class SaveDialog(Dialog):
         if ui.button("Browse", width=96, height=27):
             self._chooser.ask_where("Save", self.path, (SUFFIX,), self._chosen)
         ui.wrapped(str(self.path), ui.palette.dim, 13)
+        said = ""
         if os.path.exists(self.path) and self.path != self._own:
-            ui.text("This file exists and will be replaced.", ui.palette.accent, 13)
+            said = EXISTS
         elif self.path == self._own and self._project.is_overtaken:
             said = "Something else has saved into this file since you opened it. What it saved will be replaced."
-            ui.wrapped(said, ui.palette.accent, 13)
+        self._replaced.tell(ui, self.path, said)
         imgui.dummy(ImVec2(0, ui.px(2)))
         with ui.enabled(not (self.must_embed or self.must_link)):
             self.embed = ui.check("Keep the picture inside the project", self.embed)
@@ -106,6 +108,9 @@ class SaveDialog(Dialog):
         return entered
 
     def _save(self) -> bool:
+        if not self._replaced.is_told:
+            self._asks_name = True
+            return False
         if not (self.must_embed or self.must_link):
             self._preferences.embed = self.embed
         saved = self.attempt(lambda: self._write(self.path, self.embed))

@@ -257,7 +257,7 @@ class _Applying:
                 outputs.animation(first, rate, order.quality, self.source.picture, clip),
                 cancel=progress.cancel,
                 passed=progress.advance,
-                written=record.add if record else lambda number: None,
+                written=record.add if record else lambda number, file: None,
             )
             written = write_all(((n, self._frame(n, one, is_own)) for n, one in pictures), writer, progress)
         progress.expect(-kept.count)

@@ -497,9 +497,9 @@ class _Export:
         }
 
 
-def noting(records: dict[Path, Record], path: Path) -> Callable[[int], None]:
+def noting(records: dict[Path, Record], path: Path) -> Callable[[int, Path], None]:
     """What hears of each frame that is written of a sequence: its record, if it has one."""
-    return records[path].add if path in records else lambda number: None
+    return records[path].add if path in records else lambda number, file: None
 
 
 class Kept:

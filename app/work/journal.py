@@ -29,7 +29,7 @@ from app.model.recipe import Recipe
 from app.model.schema import Model, frozen, plain
 from app.model.undo import DEFAULT_BUDGET, LISTS, Entry, History
 
-VERSION = 1
+VERSION = 2
 MOST_RECORDS = 200_000  # a minute of painting has some hundred, and now and then all is written anew in a few
 MOST_DIGITS = 9  # of a version: no number is made of more
 _HEAD = "fluidwarp journal"
@@ -54,6 +54,7 @@ class Origin:
         embedded: pictures are kept in the project and not referred to.
         inside: the picture is nowhere but in the project's file.
         size, crc: of the bytes of the picture's file, by which it is known again.
+        seen: the project's own file as it was then; see `Project.seen`.
     """
 
     name: str
@@ -63,13 +64,14 @@ class Origin:
     inside: bool
     size: int
     crc: int
+    seen: tuple[int, ...] | None = None
 
     @classmethod
     def of(cls, project: Project) -> Origin:
         path = os.path.abspath(project.path) if project.path is not None else None
         data, inside = project.data, project.keeper is not None
         folder = os.path.abspath(project.folder)
-        return cls(project.name, folder, path, project.embedded, inside, len(data), zlib.crc32(data))
+        return cls(project.name, folder, path, project.embedded, inside, len(data), zlib.crc32(data), project.seen)
 
     def is_of(self, data: bytes) -> bool:
         """True if `data` are the bytes of the picture that was worked on."""
@@ -304,7 +306,11 @@ def _origin(told: dict[str, Any]) -> Origin:
         _text(text)
     for number in (origin.size, origin.crc):
         _count(number)
-    return origin
+    if origin.seen is None:
+        return origin
+    if not isinstance(origin.seen, list) or any(type(number) is not int for number in origin.seen):
+        raise ValueError
+    return replace(origin, seen=tuple(origin.seen))
 
 
 def _text(value: Any) -> str:
@@ -376,10 +382,11 @@ def project_of(origin: Origin, recipe: Recipe) -> Project:
         source = picture_file(origin, recipe)
         try:
             found, data = projects.read_source(source)
-            return Project(recipe, found.picture, data, Path(origin.folder), path, origin.embedded, clip=found.clip)
+            folder, clip = Path(origin.folder), found.clip
+            return Project(recipe, found.picture, data, folder, path, origin.embedded, clip=clip, seen=origin.seen)
         except (UserError, OSError):
             # A picture that was put into the project when it was saved is there still.
             if path is None or not origin.embedded or not path.exists():
                 raise
     assert path is not None
-    return replace(projects.load(path), recipe=recipe)
+    return replace(projects.load(path), recipe=recipe, seen=origin.seen)

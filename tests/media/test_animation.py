@@ -1088,6 +1088,56 @@ def test_a_clip_of_which_the_clock_began_long_before_is_as_long_as_it_is(tmp_pat
     assert not said
 
 
+@pytest.mark.parametrize("ending", ["mkv", "webm"])
+def test_a_clip_whose_times_begin_below_zero_is_read_from_there(tmp_path: Path, ending: str):
+    """Where ffmpeg cannot seek, the window showed another frame, or none, and the length was half of what it is."""
+    codec = "libvpx-vp9" if ending == "webm" else "mjpeg"
+    how = ("-c:v", codec, "-output_ts_offset", "-1", "-avoid_negative_ts", "disabled")
+    clip = read_clip(generate(tmp_path / f"a.{ending}", "testsrc=s=64x48:r=10:d=2", *how))
+    assert clip.frames == 20
+    frames = list(clip.read_frames())
+    assert len(frames) == 20
+    number, picture = next(clip.pictures_from(12))
+    assert number == 12
+    assert np.array_equal(picture.pixels, frames[12])
+
+
+@pytest.mark.parametrize("ending", ["mp4", "mov", "mkv", "webm"])
+@pytest.mark.parametrize("first", [0, 12])
+def test_the_sound_of_a_clip_whose_times_begin_below_zero_is_kept(tmp_path: Path, ending: str, first: int):
+    source = tmp_path / "a.webm"
+    sound = "aevalsrc='if(gt(t,1.5),sin(2000*t),0)':s=48000:d=2"  # nothing is heard of the first second and a half
+    command = ["-f", "lavfi", "-i", "testsrc=s=64x48:r=10:d=2", "-f", "lavfi", "-i", sound, "-c:v", "libvpx"]
+    ffmpeg.run([*command, "-output_ts_offset", "-1", "-avoid_negative_ts", "disabled", str(source)], str(source))
+    clip = read_clip(source)
+    how = AnimationOptions(sound=source, frames=20 - first, sound_from=first / 10 + clip.late)
+    with animation_writer(tmp_path / f"b.{ending}", 10, how) as write:
+        for frame in list(clip.read_frames())[first:]:
+            write(frame)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.webm", f"b.{ending}"]
+    heard = ffmpeg.ask(
+        "-i", f"file:{tmp_path / f'b.{ending}'}", "-map", "0:a", "-f", "f32le", "-ac", "1", "-ar", "48000", "-"
+    )
+    samples = np.frombuffer(heard.stdout, np.float32)
+    assert len(samples) / 48000 == pytest.approx(2 - first / 10, abs=0.05)
+    assert np.flatnonzero(np.abs(samples) > 0.1)[0] / 48000 == pytest.approx(1.5 - first / 10, abs=0.03)
+
+
+@pytest.mark.parametrize("second", ["64x48", "128x96"])
+def test_frames_that_change_their_size_are_told(tmp_path: Path, second: str):
+    """An MPEG of two recordings; and one that is read from a frame of the second on, as the window does."""
+    joined = b""
+    for number, size in enumerate(("64x48", second)):
+        part = generate(tmp_path / f"{number}.m2v", f"testsrc=s={size}:r=10:d=1", "-c:v", "mpeg2video")
+        joined += part.read_bytes()
+    path = tmp_path / "a.m2v"
+    path.write_bytes(joined)
+    clip, said = read_clip(path), list[str]()
+    assert {frame.shape for frame in clip.read_frames(notice=said.append)} == {(48, 64, 3)}
+    told = f"{path}: its frames are of 64 x 48 and 128 x 96 pixels, and all become 64 x 48"
+    assert [line for line in said if "frames are of" in line] == ([told] if second == "128x96" else [])
+
+
 def test_a_clip_that_is_replaced_or_deleted_while_it_is_read_is_read_to_its_end(tmp_path: Path):
     path = generate(tmp_path / "a.mkv", "testsrc=s=640x480:r=10:d=4", "-c:v", "ffv1")
     other = generate(tmp_path / "b.mkv", "testsrc=s=64x48:r=10:d=1", "-c:v", "ffv1")

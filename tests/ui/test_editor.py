@@ -803,6 +803,26 @@ def test_saving_over_what_another_has_saved_asks_first(
     assert not robot.editor.session.project.is_overtaken
 
 
+def test_what_another_has_just_saved_is_told_before_it_is_replaced(robot: Robot, tmp_path: Path) -> None:
+    """Enter, in the first frame in which it is there: the person has not read that."""
+    robot.drag((0.3, 0.4), (0.45, 0.4))
+    robot.rest()
+    robot.editor.preferences.folder = str(tmp_path)
+    robot.key("ctrl+s")
+    robot.frame(count=3)
+    dialog = robot.editor.dialogs.shown[-1]
+    assert isinstance(dialog, SaveDialog)
+    dialog.path.write_bytes(b"theirs")
+    robot.key("enter")
+    robot.frame(count=3)
+    assert dialog.path.read_bytes() == b"theirs"
+    assert robot.editor.dialogs.shown == [dialog]
+    robot.key("enter")
+    robot.frame(count=3)
+    assert not robot.editor.dialogs.shown
+    assert projects.load(dialog.path).recipe.stroke
+
+
 def test_saving_asks_for_a_name_and_where_the_picture_goes(robot: Robot, tmp_path: Path, widgets: Widgets) -> None:
     robot.drag((0.3, 0.4), (0.45, 0.4))
     robot.rest()

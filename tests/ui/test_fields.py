@@ -435,13 +435,53 @@ def test_a_file_that_will_be_replaced_is_told(
     robot: Robot, dialog: ExportDialog, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     dialog.folder = tmp_path
-    words, text = [], Ui.text
-    monkeypatch.setattr(Ui, "text", lambda ui, said, *how, **more: words.append(said) or text(ui, said, *how, **more))
+    words, wrapped = [], Ui.wrapped
+    monkeypatch.setattr(Ui, "wrapped", lambda ui, said, *how: words.append(said) or wrapped(ui, said, *how))
     for is_there in (False, True):
         words.clear()
         robot.frame()
         assert ("This file exists and will be replaced." in words) is is_there
         dialog.job().target.write_bytes(b"")
+    dialog.name = "f.%04d"
+    for number, is_there in ((None, False), (12, True)):
+        if number is not None:
+            dialog.output.with_name(f"f.{number:04d}{dialog.ending}").touch()
+        words.clear()
+        robot.frame()
+        told = "Files of this name exist, and those of the same numbers will be replaced."
+        assert (told in words) is is_there
+
+
+def test_what_another_has_just_written_is_told_before_it_is_replaced(
+    robot: Robot, dialog: ExportDialog, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Enter, in the first frame in which it is there, or is another: the person has not read that."""
+    started = list[Job]()
+    monkeypatch.setattr(robot.editor.exports, "start", started.append)
+    dialog.folder = tmp_path
+    robot.frame(count=3)
+    for theirs in (b"theirs", b"theirs again"):
+        dialog.output.write_bytes(theirs)
+        robot.key("enter")
+        assert not started
+    robot.frame(count=3)
+    robot.key("enter")
+    robot.frame()
+    assert len(started) == 1
+    assert not robot.editor.dialogs.shown
+
+
+def test_a_picture_that_the_work_needs_is_not_replaced_by_an_export(
+    robot: Robot, dialog: ExportDialog, widgets: Widgets
+) -> None:
+    project = robot.editor.session.project
+    before = (project.folder / "pattern.png").read_bytes()
+    dialog.folder, dialog.name = project.folder, "pattern"
+    robot.frame(count=2)
+    widgets.click("Export")
+    assert dialog.problem.endswith("pattern.png would be replaced by its own result; choose another name")
+    assert not robot.editor.exports.is_running
+    assert (project.folder / "pattern.png").read_bytes() == before
 
 
 def test_an_exported_picture_is_what_is_asked_for(robot: Robot, dialog: ExportDialog, widgets: Widgets) -> None:

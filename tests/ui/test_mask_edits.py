@@ -172,6 +172,20 @@ def test_a_mask_that_was_saved_is_loaded_as_it_was(robot: Robot, tmp_path: Path,
     assert not np.array_equal(cleared, before)
 
 
+def test_a_mask_takes_the_place_of_no_picture_of_the_work(robot: Robot, tmp_path: Path) -> None:
+    """Neither of the one that is warped, nor of a mask that was loaded: of these it would make another work."""
+    files, folder = robot.editor.files, robot.editor.session.project.folder
+    write_picture(tmp_path / "mask.png", Picture(np.full((9, 12, 1), 200, np.uint8)))
+    files.load_mask(tmp_path / "mask.png", "frozen")
+    for kept in (folder / "pattern.png", tmp_path / "mask.png"):
+        before = kept.read_bytes()
+        with pytest.raises(UserError, match=f"{kept.name} would be replaced by its own result"):
+            files.save_mask(kept, "frozen")
+        assert kept.read_bytes() == before
+    files.save_mask(tmp_path / "other.png", "frozen")
+    robot.key("ctrl+z")
+
+
 def test_what_is_not_painted_is_not_saved(robot: Robot, tmp_path: Path) -> None:
     with pytest.raises(UserError, match="nothing on this mask"):
         robot.editor.files.save_mask(tmp_path / "mask.png", "frozen")

@@ -120,3 +120,25 @@ def test_the_hint_goes_and_the_theme_changes_for_good(file: Path) -> None:
     for theme in ("light", "dark"):
         likes.toggle_theme()
         assert Preferences.load().theme == likes.theme == theme
+
+
+def test_what_two_windows_have_changed_is_all_kept(file: Path) -> None:
+    """Each writes what a person has changed in it, and leaves what the other one has."""
+    Preferences(presets={"Old": {}, "Gone": {}}, recent=["/old"], path=file).save()
+    one, other = Preferences.load(), Preferences.load()
+    one.presets["One"] = {"hardness": 0.5}
+    del one.presets["Gone"]
+    one.keys["undo"] = ["ctrl+b"]
+    one.theme = "light"
+    one.opened(file.parent / "one.png")
+    other.presets["Other"] = {"radius": 0.25}
+    other.keys["undo"], other.keys["redo"] = ["ctrl+j"], ["ctrl+k"]
+    other.opened(file.parent / "other.png")
+    for likes in (Preferences.load(), one):
+        likes.dismiss_hint()
+    kept = Preferences.load()
+    assert kept.presets == {"Old": {}, "One": {"hardness": 0.5}, "Other": {"radius": 0.25}}
+    assert kept.keys == {"undo": ["ctrl+j"], "redo": ["ctrl+k"]}
+    assert [Path(name).name for name in kept.recent] == ["other.png", "one.png", "old"]
+    assert (kept.theme, kept.hint) == ("light", False)
+    assert (one.theme, other.theme) == ("light", "dark")  # no window changes under its person's hands

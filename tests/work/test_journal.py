@@ -18,7 +18,7 @@ from app.model.undo import Entry, History
 from app.work import journal
 from app.work.journal import Damaged, Newer, Origin, Work, beginning, continuation, read
 
-ORIGIN = Origin("Käse 1", "/pictures", None, True, False, 12, 34)
+ORIGIN = Origin("Käse 1", "/pictures", None, True, False, 12, 34, (1, 2, 3, -4))
 TOOLS = ("push", "twirl", "freeze", "curve")
 
 
@@ -245,7 +245,7 @@ def test_what_is_no_journal_is_damaged(data: bytes) -> None:
         read(data)
 
 
-@pytest.mark.parametrize("head", [b"fluidwarp journal 2 1\n", f"fluidwarp journal 1 {RECIPE_VERSION + 1}\n".encode()])
+@pytest.mark.parametrize("head", [b"fluidwarp journal 3 1\n", f"fluidwarp journal 1 {RECIPE_VERSION + 1}\n".encode()])
 def test_a_newer_journal_says_so(head: bytes) -> None:
     with pytest.raises(Newer):
         read(head + b"whatever there may be then\n")

@@ -566,6 +566,21 @@ def test_what_is_told_of_a_damaged_project_is_in_whole_sentences(tmp_path: Path)
         found_in(desk.root).load()
 
 
+@pytest.mark.parametrize("embedded", [True, False])
+@pytest.mark.parametrize("reopened", [True, False], ids=["reopened", "saved"])
+def test_what_another_has_saved_since_is_noticed(tmp_path: Path, embedded: bool, reopened: bool) -> None:
+    """Work that is restored would otherwise be saved over it without a question."""
+    path = tmp_path / "work.fluidwarp"
+    project = projects.save(small_project(tmp_path), path, embedded)
+    desk = Desk(tmp_path / "journals", projects.load(path) if reopened else project)
+    desk.push()
+    desk.die()
+    found = found_in(desk.root)
+    assert not found.load().is_overtaken
+    projects.save(projects.load(path), path, embedded)
+    assert found.load().is_overtaken
+
+
 def test_another_picture_of_the_same_name_is_noticed(desk: Desk, tmp_path: Path) -> None:
     desk.push()
     desk.die()

@@ -14,6 +14,7 @@ import OpenEXR
 import pytest
 
 from app.errors import UserError
+from app.media.animation import animation_writer
 from app.media.displacement import Displacement
 from app.media.maps import write_map
 from app.media.pictures import read_picture, write_picture
@@ -252,21 +253,44 @@ def test_what_is_put_in_the_place_of_a_record_is_neither_followed_nor_waited_for
 def test_a_record_that_becomes_a_link_while_frames_are_written_is_not_followed(tmp_path: Path):
     record = Record(tmp_path / "f.%d.png", str)
     (tmp_path / "f.1.png").write_bytes(b"1")
-    record.add(1)
+    record.add(1, tmp_path / "f.1.png")
     (path,) = tmp_path.glob(".fluidwarp-frames-*")
     path.rename(tmp_path / "precious")
     path.symlink_to("precious")
     before = (tmp_path / "precious").read_bytes()
     with pytest.raises(UserError, match=r"fluidwarp-frames-\w+: it is a link; remove it"):
-        record.add(1)
+        record.add(1, tmp_path / "f.1.png")
     assert (tmp_path / "precious").read_bytes() == before
+
+
+def test_a_frame_that_another_task_replaces_at_once_is_not_taken_for_ones_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """Two tasks of different recipes that write to the same names: the one's frame was noted as the other's."""
+    records = [Record(tmp_path / "f.%d.png", f"{recipe} {{}}".format) for recipe in "ab"]
+    replace = os.replace
+
+    def write(task: int) -> None:
+        pixels = np.full((8, 8, 3), task, np.uint8)
+        with animation_writer(tmp_path / "f.%d.png", written=records[task].add) as frame:
+            frame(pixels, 1)
+
+    def replacing_at_once(source: Path, target: Path) -> None:
+        replace(source, target)
+        monkeypatch.setattr(os, "replace", replace)
+        write(1)
+
+    monkeypatch.setattr(os, "replace", replacing_at_once)
+    write(0)
+    assert read_picture(tmp_path / "f.1.png").pixels.max() == 1
+    assert [record.holds(1) for record in records] == [False, True]
 
 
 def test_a_file_that_has_become_longer_is_not_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     file = tmp_path / "f.1.png"
     file.write_bytes(b"1")
     record = Record(tmp_path / "f.%d.png", str)
-    record.add(1)
+    record.add(1, file)
     assert Record(tmp_path / "f.%d.png", str).holds(1)
     os.truncate(file, 2**40)
     monkeypatch.setattr("app.media.record.digest_of_file", lambda path: pytest.fail("it is read"))
