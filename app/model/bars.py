@@ -153,8 +153,6 @@ def with_changed(recipe: Recipe, which: Collection[Which], changed: Changed) -> 
         several = enumerate(several_of(recipe, kind))
         made = [changed(one) if (kind, number) in which else one for number, one in several]
         parts[kind] = tuple(one for one in made if one is not None)
-    if recipe.handle and parts.get("handle") == ():
-        parts["stop"] = recipe.stop.model_copy(update={"handles_within": None})
     edited = recipe.edited(**parts)
     before, after = (max((stroke.end_tick for stroke in each.stroke), default=-1) for each in (recipe, edited))
     ticks, dt = recipe.ticks + after - before, recipe.fluid.dt

@@ -355,8 +355,14 @@ class Recipe(Model):
         return tuple(edit for edit in self.mask if edit.tick == tick)
 
     def edited(self, **parts: Any) -> Self:
-        """The recipe with some of its parts replaced by parts that are valid in themselves; shares all the others."""
-        return self.model_copy(update=parts)
+        """The recipe with some of its parts replaced by parts that are valid in themselves; shares all the others.
+
+        Where no handle is left, none is waited for any more, unless `parts` has what ends it.
+        """
+        edited = self.model_copy(update=parts)
+        if "stop" in parts or edited.handle or edited.stop.handles_within is None:
+            return edited
+        return edited.edited(stop=edited.stop.model_copy(update={"handles_within": None}))
 
     def on_grid(self, cells: int) -> Self:
         """The recipe, simulated on another grid."""

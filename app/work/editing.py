@@ -141,10 +141,7 @@ class Editing(Painting):
     def let_go(self, label: str) -> None:
         """Take a handle or a pin away, as if it had never been."""
         self.release()
-        parts = with_led(self._live, label, lambda _: None)
-        if not parts["handle"]:
-            parts["stop"] = self._base.stop.model_copy(update={"handles_within": None})
-        self.edit(f"Remove {label.partition('[')[0]}", **parts)
+        self.edit(f"Remove {label.partition('[')[0]}", **with_led(self._live, label, lambda _: None))
 
     def start_from_map(self, name: str | None) -> None:
         """Begin with a warp map instead of the picture as it is, or, None, as it is again; an entry of the history.

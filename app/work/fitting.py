@@ -33,9 +33,11 @@ from app.model.picture import Picture
 from app.model.recipe import UNNAMED, Recipe
 from app.model.sampling import Point
 from app.model.schema import label_of
+from app.model.timeline import Sentinel
 from app.model.windows import with_detail
 from app.progress import Progress
 from app.work.loaded_handles import LoadedHandles
+from app.work.observation import observe
 from app.work.replay import Replay
 from solver.brush.handle import Shape, area
 from solver.components import connected_components
@@ -70,6 +72,7 @@ class Trial:
             no difference. Landmarks are matched by flows along the shortest one (Joshi and Miller, 2000).
         det: the least det J of the map.
         folds: places where it is not positive.
+        verdict: which condition of the recipe's own [stop] ended it and when, or None.
     """
 
     recipe: Recipe
@@ -79,6 +82,7 @@ class Trial:
     work: float
     det: float
     folds: int
+    verdict: str | None = None
 
     @property
     def excess(self) -> float:
@@ -328,7 +332,8 @@ def _aimed(device: Device, recipe: Recipe, pictures: Pictures, pairs: Pairs | No
     picture = pictures.source
     extent = picture.width / max(picture.width, picture.height), picture.height / max(picture.width, picture.height)
     if pairs is not None:
-        base, start = recipe.edited(handle=tuple(each for each in recipe.handle if not _is_fitted(each))), _anew(recipe)
+        kept, start = tuple(each for each in recipe.handle if not _is_fitted(each)), _anew(recipe)
+        base = recipe.edited(handle=kept, stop=recipe.stop)  # which goes on to wait for those that come
         if start:
             base = base.edited(duration=max(base.duration, start + DURATION[0]))
         # What is local carries a curve's points between its handles along: a fluid flows back there. And all do, since
@@ -558,6 +563,8 @@ class _Search:
         missed = [number for number in self.numbers if not trial.errors[number] <= ARRIVED]
         self._note_missed(missed, errors)
         self._explain(trial.recipe, bool(missed))
+        if missed and trial.verdict is not None:
+            self.notices.append(trial.verdict)
         arrived = np.stack([self.pairs[:, 0], trial.arrived], axis=1)[self.numbers]
         pairs = Pairs(arrived, tuple(self.aim.pairs.curves[number] for number in self.numbers))
         is_met = not (missed or trial.folds) and len(self.numbers) == len(self.pairs)
@@ -617,12 +624,15 @@ class _Search:
 
     def _played(self, stage: _Stage, recipe: Recipe, progress: Progress) -> Trial:
         replay = Replay(self.device, recipe, stage.pictures, budget=0)
+        sentinel, verdict = Sentinel(recipe.stop, recipe.fluid.dt), None
         try:
             work = 0.0
-            for _ in range(recipe.ticks):
+            while replay.tick < recipe.ticks and verdict is None:
                 progress.check()
                 replay.advance()
                 work += _strain(replay) * recipe.fluid.dt
+                if not sentinel.is_idle:
+                    verdict = sentinel.verdict(replay.tick, observe(replay, sentinel))
             found = replay.warp.statistics()
             leads = [self.aim.leads[number] for number in self.numbers]
             points = np.concatenate([lead.shape.led for lead in leads])
@@ -634,7 +644,8 @@ class _Search:
         several = np.split(points, np.cumsum([len(lead.shape.led) for lead in leads])[:-1])
         for number, lead, places in zip(self.numbers, leads, several, strict=True):
             arrived[number], off[number] = lead.shape.middle(places) / self.extent, lead.off(places)
-        return Trial(recipe, arrived, off[:, 0], off[self.hopeful, 1], work, found.det_min, found.folds)
+        residuals = off[self.hopeful, 1]
+        return Trial(recipe, arrived, off[:, 0], residuals, work, found.det_min, found.folds, verdict)
 
     def _label(self, number: int) -> str:
         """What messages call a pair."""

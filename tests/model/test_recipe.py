@@ -12,6 +12,7 @@ from app.errors import UserError
 from app.media.opening import shipped_recipes
 from app.media.recipes import read_recipe
 from app.model import toml
+from app.model.edits import cut_off
 from app.model.recipe import DensitySettings, FluidSettings, Output, Playback, Recipe
 from app.model.schema import written
 from app.model.strokes import Change, Dab, Stroke
@@ -384,6 +385,15 @@ def test_what_is_cut_off_at_a_tick_is_what_was_passed_before_it():
         assert [cut.at(k) for k in range(tick)] == [stroke.at(k) for k in range(tick)]
     assert stroke.before(2) is None
     assert stroke.before(7) is stroke
+
+
+def test_what_is_left_of_a_recipe_whose_handles_are_cut_off_waits_for_none_and_can_be_read_again():
+    handle = "[[handle]]\nat = [0.4, 0.5]\nto = [0.5, 0.5]\nstart = 0.5\n"
+    recipe = Recipe.parse(f"duration = 2.0\n[fluid]\ndt = 0.1\n[stop]\nhandles_within = 0.001\n{handle}")
+    assert cut_off(recipe, 10).stop.handles_within == 0.001
+    cut = cut_off(recipe, 2)
+    assert cut.handle == ()
+    assert Recipe.parse(cut.text()) == cut
 
 
 def test_sampling_more_often_is_the_same_path():

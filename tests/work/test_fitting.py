@@ -171,6 +171,22 @@ def test_pairs_are_led_after_the_last_reset_of_the_warp(device: Device):
     assert not found.notices
 
 
+def test_a_fit_ends_where_the_recipe_s_own_stop_ends_it(device: Device):
+    """It told of errors at the end of its duration, which is never reached when it is rendered."""
+    found = fit(device, PAIRS, 1, FREE + "[stop]\ndisplacement_above = 0.02\n")
+    assert found.errors.min() > 1
+    assert not found.is_met
+    missed, stopped = found.notices
+    assert "pixels from where they should be" in missed
+    assert re.match(r"stopped at t = 0\.\d+ s \(tick \d+\): largest displacement", stopped)
+
+
+def test_what_is_fitted_anew_is_waited_for_as_before(device: Device):
+    waits = FREE + "[stop]\nhandles_within = 0.0005\n"
+    recipe = f'{waits}[[handle]]\nname = "pair 1"\nat = [0.3, 0.4]\nto = [0.4, 0.4]\n'
+    assert fit(device, PAIRS, 1, recipe).trial.recipe.stop.handles_within == 0.0005
+
+
 def test_what_is_frozen_only_at_first_can_be_met(device: Device):
     frozen = '[[mask]]\nkind = "fill"\ntick = 0\nof = "frozen"\namount = 1\n'
     thawed = '[[mask]]\nkind = "clear"\ntick = 2\nof = "frozen"\n'
