@@ -434,6 +434,20 @@ def test_statistics_of_linear_maps(device: Device) -> None:
     assert warp.statistics().det_error == pytest.approx(2.0, abs=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("size", "places"),
+    [((64, 32), 64 * 32), ((66, 33), 33 * 17), ((128, 64), 64 * 32), ((192, 96), 64 * 32), ((256, 8), 256 * 8)],
+)
+def test_a_large_map_is_measured_at_as_many_of_its_texels_as_may_be(
+    device: Device, monkeypatch: pytest.MonkeyPatch, size: tuple[int, int], places: int
+) -> None:
+    """At all, or at one of two or three in each direction."""
+    monkeypatch.setattr("solver.warp.map.MOST_PLACES", 64 * 32)
+    warp = WarpMap(device, Grid.for_picture(*size, 32), size)
+    assert warp.statistics().places == places
+    warp.release()
+
+
 def test_a_map_of_any_size_is_taken_over(device: Device) -> None:
     warp = WarpMap(device, Grid(40, 24))
     for size in ((40, 24), (80, 48), (123, 77)):
