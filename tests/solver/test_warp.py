@@ -479,6 +479,30 @@ def test_the_chain_rule_tells_of_the_map_as_it_is_looked_up_into_the_corners(
     warp.release()
 
 
+@pytest.mark.parametrize(
+    "sticky", [(True, False, False, True), (False, True, False, False), (False, False, True, True)]
+)
+def test_the_chain_rule_tells_of_the_map_along_each_edge_whichever_of_them_the_fluid_sticks_to(
+    device: Device, sticky: tuple[bool, bool, bool, bool]
+) -> None:
+    """Within the outermost texels, before all that has moved is taken in and after."""
+    rng, grid, step = np.random.default_rng(3), Grid(12, 9), np.eye(2) * 1e-3
+    fluid, warp = Fluid(device, grid, FluidParams(walls=Walls(sticky=sticky))), WarpMap(device, grid, (36, 27))
+    points = (rng.integers((0, 0), (35, 26), (4, 50, 2)) + rng.uniform(0.6, 1.4, (4, 50, 2))) / 36  # beside no centre
+    for side, (axis, edge) in enumerate(((0, 0.0), (0, 1.0), (1, 0.0), (1, 0.75))):
+        points[side, :, axis] = np.abs(edge - rng.uniform(0.002, 0.012, 50))
+    points = points.reshape(200, 2)
+    fluid.set_velocity(rng.normal(0, 0.03, (9, 12, 2)))
+    warp.follow(fluid, 1.0)
+    for _ in range(2):
+        jacobian = np.stack([(warp.at(points + e) - warp.at(points - e)) / 2e-3 + 1e3 * e for e in step], axis=-1)
+        error = np.abs(np.linalg.det(jacobian.astype(np.float64)) - warp.determinants(points))
+        assert error.max() < 0.06
+        warp.remap()
+    for thing in (warp, fluid):
+        thing.release()
+
+
 def test_restoring_makes_the_identity_under_the_brush_without_folds(device: Device) -> None:
     grid = Grid(64, 48)
     warp = WarpMap(device, grid)
