@@ -63,6 +63,22 @@ def test_bloat_doubles_its_exponent_in_a_second(device: Device, tool: str, sign:
         assert rate == pytest.approx(sign * pressure * 2.0 * (1 - math.pi * 0.2**2 / 4 / 0.75), rel=0.01)
 
 
+@pytest.mark.parametrize("tool", ["push", "twirl", "bloat", "pinch"])
+@pytest.mark.parametrize("pressures", [(0.2, 0.6, 1.0), (1.0, 0.6, 0.2)], ids=["rising", "falling"])
+def test_several_pressures_in_one_tick_carry_the_fluid_as_their_mean(
+    device: Device, tool: str, pressures: tuple[float, ...]
+) -> None:
+    """Of each piece of the way that is the mean of its ends, and of the tick that of its pieces."""
+    flows = []
+    for each in (pressures, (0.6, 0.6, 0.6)):
+        samples = tuple((0, x, 0.5, p) for x, p in zip((0.45, 0.5, 0.55), each, strict=True))
+        with replayed(device, tool, (0, 1.0), samples=samples) as replay:
+            replay.seek(1)
+            flows.append(replay.fluid.velocity_at_centres())
+    assert np.abs(flows[1]).max() > 1e-3
+    assert np.abs(flows[0] - flows[1]).max() < 1e-5 * np.abs(flows[1]).max()
+
+
 def test_a_curve_blows_at_half_a_side_a_second(device: Device) -> None:
     samples = ((0, 0.3, 0.5, 1.0), (0, 0.7, 0.5, 1.0))
     with replayed(device, "curve", (0, 1.0), viscosity=1e-4, samples=samples) as replay:
