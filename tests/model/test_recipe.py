@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 from pydantic import ValidationError
@@ -14,7 +15,7 @@ from app.media.recipes import read_recipe
 from app.model import toml
 from app.model.recipe import DensitySettings, FluidSettings, Output, Playback, Recipe
 from app.model.schema import written
-from app.model.strokes import Change, Dab, Stroke
+from app.model.strokes import Change, Dab, Sample, Stroke
 
 ROOT = Path(__file__).parents[2]
 
@@ -415,6 +416,29 @@ def test_recipes_agree_until_they_differ():
     assert recipe.agrees_until(recipe.edited(change=(Change(tick=7, drag=1.0),))) == 7
     assert recipe.agrees_until(recipe.edited(duration=9.0, name="other")) == float("inf")
     assert recipe.agrees_until(Recipe.parse("[fluid]\ngrid = 64").edited(stroke=recipe.stroke)) == 0
+
+
+@pytest.mark.parametrize("other", [(19, 0.5, 0.4, 0.7), (20, 0.6, 0.4, 0.7), (20, 0.5, 0.3, 0.7), (20, 0.5, 0.4, 0.8)])
+def test_strokes_part_after_the_last_sample_that_is_the_same_in_all(other: Sample):
+    """In its tick, its place and its pressure."""
+    first, last = (10, 0.1, 0.2, 0.7), (30, 0.9, 0.4, 0.7)
+    one, two = push(first, (20, 0.5, 0.4, 0.7), last), push(first, other, last)
+    assert one.agrees_until(two) == two.agrees_until(one) == 11
+
+
+@pytest.mark.parametrize(
+    "keys",
+    [
+        {"tool": "twirl"}, {"radius": 0.2}, {"hardness": 0.1}, {"strength": 0.5}, {"reverse": True}, {"detail": 1},
+        {"symmetry": "left-right"}, {"symmetry": "radial"}, {"sectors": 5}, {"hold": 0.3}, {"local": 0.3},
+        {"muted": True},
+    ],
+    ids=str,
+)  # fmt: skip
+def test_strokes_of_which_a_brush_differs_in_anything_part_at_their_first_tick(keys: dict[str, Any]):
+    samples = (10, 0.1, 0.2, 0.7), (20, 0.5, 0.4, 0.7)
+    one, two = push(*samples), push(*samples, **keys)
+    assert one.agrees_until(two) == two.agrees_until(one) == 10
 
 
 def test_past_before_the_parting_is_the_same():
