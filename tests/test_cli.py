@@ -17,7 +17,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from app import cli, doctor
+from app import cli, doctor, progress
+from app.errors import UserError
 from app.gallery import figures, retouching
 from app.media.displacement import Displacement
 from app.media.maps import read_map, write_map
@@ -25,7 +26,7 @@ from app.media.pictures import read_picture, write_picture
 from app.media.project import from_recipe, save
 from app.model.picture import Picture
 from app.model.recipe import Recipe
-from app.progress import Progress
+from app.progress import Progress, leave
 from app.ui import window
 from app.work.export import run
 from app.work.jobs import Job, Outputs
@@ -125,6 +126,36 @@ def test_the_gallery_draws_the_figures_or_what_is_painted_and_tells_what_was_mea
     for words, name in (((), "figures"), (("--strokes",), "retouching")):
         ran = fluidwarp(folder, "gallery", "-o", "x", *words)
         assert (ran.returncode, ran.stdout) == (0, f"{name}: folds 0, sharpness 0.5\n")
+
+
+@pytest.mark.parametrize(
+    ("line", "what", "steps", "at_once"),
+    [
+        ("render a.toml -o b.png --map m.npy", "b.png", None, leave),
+        ("render a.toml cat.png b.png -o out", "2 pictures", 2, leave),
+        ("render a.toml cat.png -o out/ --jobs 2", "1 picture", 1, None),
+        ("apply m.npy cat.png -o c.png", "c.png", None, leave),
+        ("convert m.npy -o n.flo", "n.flo", None, leave),
+        ("fit a.toml --pairs p.csv -o f.toml", "f.toml", None, None),
+        ("gallery -o x", "gallery", None, leave),
+    ],
+)
+def test_a_bar_tells_what_is_made_and_of_how_many_steps(
+    folder: Path, fluidwarp: Run, monkeypatch: pytest.MonkeyPatch, line: str, what: str, steps: int | None, at_once: Any
+):
+    """And what a second Ctrl+C does: nothing at once where processes or the best so far have to be waited for."""
+    heard = []
+
+    def listen(description: str, total: int | None, at_once: Any = leave) -> Any:
+        heard.append((description, total, at_once))
+        raise UserError("that is all")
+
+    monkeypatch.setattr(progress, "on_terminal", listen)
+    write_map(folder / "m.npy", Displacement(np.zeros((48, 64, 2), np.float32)))
+    write_picture(folder / "b.png", read_picture(folder / "cat.png"))
+    (folder / "p.csv").write_text("20,20,23,21\n")
+    ran = fluidwarp(folder, *line.split())
+    assert (heard, "that is all" in ran.stderr) == ([(what, steps, at_once)], True)
 
 
 def test_names_in_capitals_are_of_the_same_kind(folder: Path, fluidwarp: Run):

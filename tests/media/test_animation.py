@@ -934,6 +934,17 @@ def test_what_belongs_to_a_track_is_told(tmp_path: Path):
     assert read_clip(generate(tmp_path / "a.mov", source, *reel)).note == "a.mov: its track's tag reel_name is not kept"
 
 
+def test_what_muxers_count_of_a_track_is_no_loss(tmp_path: Path):
+    """As mkvmerge writes it."""
+    counted = ["BPS", "BPS-eng", "DURATION-eng", "NUMBER_OF_FRAMES", "NUMBER_OF_BYTES-eng", "SOURCE_ID"]
+    counted += [f"_STATISTICS_{name}" for name in ("WRITING_APP", "WRITING_DATE_UTC", "TAGS")]
+    further = [word for tag in counted for word in ("-metadata:s:v:0", f"{tag}=1")]
+    assert read_clip(generate(tmp_path / "a.mkv", "testsrc=s=64x48:r=10:d=0.1", *further)).note == ""
+    further += ["-metadata:s:v:0", "SCENE=1"]
+    said = "b.mkv: its track's tag SCENE is not kept"
+    assert read_clip(generate(tmp_path / "b.mkv", "testsrc=s=64x48:r=10:d=0.1", *further)).note == said
+
+
 def test_sound_and_times_that_a_format_has_no_room_for_are_told(tmp_path: Path):
     clip = PictureSequence(
         **{"path": Path("a.mov"), "width": 63, "height": 48, "bits": 8, "alpha": False, "pixel_format": "yuv420p"},

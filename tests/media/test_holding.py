@@ -49,6 +49,27 @@ def test_what_a_sentence_says_to_write_keeps_all_that_it_says_is_lost(kind: type
     assert told > 50
 
 
+@pytest.mark.parametrize(
+    ("path", "kind", "beside", "named"),
+    [
+        ("a.jpg", np.uint8, {}, ".png"), ("a.%02d.jpg", np.uint8, {}, ".png"), ("a.avif", np.uint16, {}, ".png"),
+        ("a.tif", np.uint16, {"texts": {"T": "x"}}, ".png"), ("a.png", np.uint16, {"premultiplied": True}, ".tif"),
+        ("a.png", np.uint8, {"origin": (1, 2)}, ".exr"), ("a.png", np.float32, {}, ".exr"),
+        ("a.jpg", np.float32, {}, ".exr"), ("a.tif", np.float32, {"texts": {"T": "x"}}, ".exr"),
+        ("a.exr", np.float32, {"xmp": b"<x/>"}, ".tif"), ("a.mp4", np.uint8, {}, ".mkv"),
+        ("a.gif", np.uint8, {}, ".mkv"), ("a.webm", np.uint16, {}, ".mkv"), ("a.mov", np.uint16, {}, ".mkv"),
+    ],
+)  # fmt: skip
+def test_of_several_kinds_that_hold_it_the_usual_one_is_named(
+    path: str, kind: type, beside: dict[str, Any], named: str
+) -> None:
+    """Of stills PNG, then TIFF; of light EXR, then TIFF; of animations Matroska."""
+    values = np.random.default_rng(0).integers(0, 65536, (8, 8, 4)).astype(np.uint16)
+    pixels = {np.uint8: values >> 8, np.float32: values / np.float32(40000)}.get(kind, values).astype(kind)
+    animated = "%" in path or f".{path.split('.')[-1]}" in ANIMATIONS
+    assert f"; write {named} to keep" in losses(path, Picture(pixels, **beside), animated=animated).said
+
+
 @pytest.mark.parametrize("is_light", [False, True])
 def test_only_what_is_multiplied_by_alpha_is_divided_by_it(is_light: bool) -> None:
     """A PNG of 16 bits holds codes of 16 bits with any alpha, unless the colours are brighter than white."""

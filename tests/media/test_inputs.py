@@ -643,6 +643,21 @@ def test_a_pipe_that_takes_a_files_place_is_not_waited_for(tmp_path: Path, monke
         open_input(path)
 
 
+@pytest.mark.parametrize(("kind", "said"), [("large", "has more than 5 bytes"), ("pipe", "a pipe or a device")])
+def test_what_was_opened_is_looked_at_and_not_what_has_its_name_by_then(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str, said: str
+):
+    path, other, opened = tmp_path / "a", tmp_path / kind, os.open
+    path.write_bytes(b"small")
+    if kind == "pipe":
+        os.mkfifo(other)
+    else:
+        other.write_bytes(b"larger")
+    monkeypatch.setattr(os, "open", lambda name, flags, *others: opened(other, flags, *others))
+    with pytest.raises(UserError, match=said):
+        open_input(path, most=5)
+
+
 @pytest.mark.parametrize("text", ["[" * 100_000, '{"scale": NaN}', '{"recent": 5}', "[]", "\0", "9" * 5000])
 def test_preferences_that_are_hostile_are_as_by_default(tmp_path: Path, text: str, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))

@@ -26,6 +26,26 @@ def test_a_handle_is_in_force_from_the_tick_whose_middle_comes_after_its_start()
         assert led.first_tick(0.1) == wanted[0]
 
 
+@pytest.mark.parametrize(
+    ("keys", "holds"),
+    [
+        ({}, True),
+        ({"muted": True}, False),
+        ({"at": [1.2, 0.5]}, False),
+        ({"at": [0.5, -0.1]}, False),
+        ({"at": [0.0, 1.0]}, True),
+        ({"points": [[-0.5, 0.5], [0.5, 0.5], [1.5, 0.5]]}, True),
+        ({"points": [[-0.5, 0.5], [1.5, 0.5]]}, False),
+        ({"points": [[1.0, 0.5], [1.5, 0.5]]}, True),
+        ({"points": [[0.2, 0.5], [0.4, 0.5]], "muted": True}, False),
+    ],
+)
+def test_a_handle_takes_hold_if_any_of_its_places_is_in_the_picture(keys: dict[str, Any], holds: bool) -> None:
+    assert handle(**keys).takes_hold is holds
+    pin = {name: value for name, value in keys.items() if name != "to"}
+    assert RecipePin.model_validate(frozen({"at": [0.5, 0.5]} | pin)).takes_hold is holds
+
+
 def test_what_a_handle_is_edited_to_is_checked() -> None:
     assert handle().edited(radius=0.2).radius == 0.2
     with pytest.raises(ValueError, match="radius"):

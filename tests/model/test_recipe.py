@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 from pydantic import ValidationError
@@ -15,7 +16,7 @@ from app.model import toml
 from app.model.edits import cut_off
 from app.model.recipe import DensitySettings, FluidSettings, Output, Playback, Recipe
 from app.model.schema import written
-from app.model.strokes import Change, Dab, Stroke
+from app.model.strokes import Change, Dab, Sample, Stroke
 
 ROOT = Path(__file__).parents[2]
 
@@ -145,6 +146,18 @@ def test_save_and_load(tmp_path: Path):
         ("stroke = 3", "'stroke' must be a list, not 3"),
         ("[force]\nkind = 'vortex'", "line 1: 'force' must be a list, not a table; begin each with [[force]]"),
         ("version = 0", "'version' must be 5, not 0"),
+        ("version = true", "'version' must be 5, not true"),
+        ("version = 1.0", "'version' must be 5, not 1.0"),
+        (
+            "[[force]]\nkind = 'vortex'\npoint = [0.1, 0.1]\nat = true",
+            "line 4: force[1]: 'at' must be a list, not true",
+        ),
+        ("[[force]]\nkind = 'vortex'\npoint = [0.1, 0.1]\nat = [1, true]", "'at[2]' must be a number, not true"),
+        ("[[handle]]\nto = [0.1, 0.1]\npoints = 3", "line 3: handle[1]: 'points' must be a list, not 3"),
+        ("[[handle]]\nto = [0.1, 0.1]\npoints = [[0.1, 0.1], 'x']", "'points[2]' must be a list, not \"x\""),
+        ("[[handle]]\nto = [0.1, 0.1]\npoints = [[0.1, 0.1], [0.2]]", "'points[2][2]' is missing"),
+        ("[[handle]]\nat = [0.1, 0.1]\ngoals = [[0.1, true], [0.2, 0.2]]", "'goals[1][2]' must be a number, not true"),
+        ("[[pin]]\npoints = true", "line 2: pin[1]: 'points' must be a list, not true"),
         ("duration = 2020-01-01", "'duration' must be a number, not 2020-01-01"),
         ("version = 6", "of version 6, and this fluidwarp reads recipes up to version 5"),
         ("duration = 1\nduration = 2", "the same key is given twice"),
@@ -425,6 +438,29 @@ def test_recipes_agree_until_they_differ():
     assert recipe.agrees_until(recipe.edited(change=(Change(tick=7, drag=1.0),))) == 7
     assert recipe.agrees_until(recipe.edited(duration=9.0, name="other")) == float("inf")
     assert recipe.agrees_until(Recipe.parse("[fluid]\ngrid = 64").edited(stroke=recipe.stroke)) == 0
+
+
+@pytest.mark.parametrize("other", [(19, 0.5, 0.4, 0.7), (20, 0.6, 0.4, 0.7), (20, 0.5, 0.3, 0.7), (20, 0.5, 0.4, 0.8)])
+def test_strokes_part_after_the_last_sample_that_is_the_same_in_all(other: Sample):
+    """In its tick, its place and its pressure."""
+    first, last = (10, 0.1, 0.2, 0.7), (30, 0.9, 0.4, 0.7)
+    one, two = push(first, (20, 0.5, 0.4, 0.7), last), push(first, other, last)
+    assert one.agrees_until(two) == two.agrees_until(one) == 11
+
+
+@pytest.mark.parametrize(
+    "keys",
+    [
+        {"tool": "twirl"}, {"radius": 0.2}, {"hardness": 0.1}, {"strength": 0.5}, {"reverse": True}, {"detail": 1},
+        {"symmetry": "left-right"}, {"symmetry": "radial"}, {"sectors": 5}, {"hold": 0.3}, {"local": 0.3},
+        {"muted": True},
+    ],
+    ids=str,
+)  # fmt: skip
+def test_strokes_of_which_a_brush_differs_in_anything_part_at_their_first_tick(keys: dict[str, Any]):
+    samples = (10, 0.1, 0.2, 0.7), (20, 0.5, 0.4, 0.7)
+    one, two = push(*samples), push(*samples, **keys)
+    assert one.agrees_until(two) == two.agrees_until(one) == 10
 
 
 def test_past_before_the_parting_is_the_same():

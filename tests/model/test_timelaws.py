@@ -195,6 +195,21 @@ def test_bad_laws_are_refused(keys: dict[str, Any], part: str) -> None:
         timed(**keys)
 
 
+@pytest.mark.parametrize(("at", "wanted"), [(1, (1,)), (1.5, (1.5,)), ([1, 1.5], (1, 1.5))])
+def test_one_instant_need_not_be_a_list(at: object, wanted: tuple[float, ...]) -> None:
+    assert timed(at=at).at == wanted
+
+
+@pytest.mark.parametrize(
+    ("at", "where"),
+    [(True, ("at",)), ("now", ("at",)), ({"x": 1}, ("at",)), ([1, True], ("at", 1)), ([2, "x"], ("at", 1))],
+)
+def test_what_is_no_instant_is_told_where_it_was_written(at: object, where: tuple[str | int, ...]) -> None:
+    with pytest.raises(ValidationError) as told:
+        timed(at=at)
+    assert told.value.errors()[0]["loc"] == where
+
+
 @pytest.mark.parametrize("keys", [{"at": 2}, {"at": [1, 2]}, {"during": [1.5, 4]}])
 def test_a_law_that_never_acts_is_told(keys: dict[str, Any]) -> None:
     remark = timed(**keys).law.check(1.0)

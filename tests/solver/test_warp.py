@@ -434,6 +434,20 @@ def test_statistics_of_linear_maps(device: Device) -> None:
     assert warp.statistics().det_error == pytest.approx(2.0, abs=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("size", "places"),
+    [((64, 32), 64 * 32), ((66, 33), 33 * 17), ((128, 64), 64 * 32), ((192, 96), 64 * 32), ((256, 8), 256 * 8)],
+)
+def test_a_large_map_is_measured_at_as_many_of_its_texels_as_may_be(
+    device: Device, monkeypatch: pytest.MonkeyPatch, size: tuple[int, int], places: int
+) -> None:
+    """At all, or at one of two or three in each direction."""
+    monkeypatch.setattr("solver.warp.map.MOST_PLACES", 64 * 32)
+    warp = WarpMap(device, Grid.for_picture(*size, 32), size)
+    assert warp.statistics().places == places
+    warp.release()
+
+
 def test_a_map_of_any_size_is_taken_over(device: Device) -> None:
     warp = WarpMap(device, Grid(40, 24))
     for size in ((40, 24), (80, 48), (123, 77)):
@@ -463,6 +477,30 @@ def test_the_chain_rule_tells_of_the_map_as_it_is_looked_up_into_the_corners(
     assert np.sort(error)[-20] < 0.05, "but where a difference reaches over the side of a cell"
     assert error[200:].max() < 0.02, "the corner's cell has none"
     warp.release()
+
+
+@pytest.mark.parametrize(
+    "sticky", [(True, False, False, True), (False, True, False, False), (False, False, True, True)]
+)
+def test_the_chain_rule_tells_of_the_map_along_each_edge_whichever_of_them_the_fluid_sticks_to(
+    device: Device, sticky: tuple[bool, bool, bool, bool]
+) -> None:
+    """Within the outermost texels, before all that has moved is taken in and after."""
+    rng, grid, step = np.random.default_rng(3), Grid(12, 9), np.eye(2) * 1e-3
+    fluid, warp = Fluid(device, grid, FluidParams(walls=Walls(sticky=sticky))), WarpMap(device, grid, (36, 27))
+    points = (rng.integers((0, 0), (35, 26), (4, 50, 2)) + rng.uniform(0.6, 1.4, (4, 50, 2))) / 36  # beside no centre
+    for side, (axis, edge) in enumerate(((0, 0.0), (0, 1.0), (1, 0.0), (1, 0.75))):
+        points[side, :, axis] = np.abs(edge - rng.uniform(0.002, 0.012, 50))
+    points = points.reshape(200, 2)
+    fluid.set_velocity(rng.normal(0, 0.03, (9, 12, 2)))
+    warp.follow(fluid, 1.0)
+    for _ in range(2):
+        jacobian = np.stack([(warp.at(points + e) - warp.at(points - e)) / 2e-3 + 1e3 * e for e in step], axis=-1)
+        error = np.abs(np.linalg.det(jacobian.astype(np.float64)) - warp.determinants(points))
+        assert error.max() < 0.06
+        warp.remap()
+    for thing in (warp, fluid):
+        thing.release()
 
 
 def test_restoring_makes_the_identity_under_the_brush_without_folds(device: Device) -> None:

@@ -15,7 +15,7 @@ from app.model.handles import RecipeHandle, RecipePin
 from app.model.recipe import Recipe
 from app.model.strokes import Stroke
 from app.ui.events import Key, Mods
-from app.ui.lanes import Lanes
+from app.ui.lanes import MOST_BLOCKS, Lanes
 from app.ui.layout import LEAST_LANES
 from app.ui.panels.lanes import name_of
 from app.ui.viewport import Rect
@@ -507,6 +507,16 @@ def test_each_time_of_a_repeated_stroke_is_as_long_on_the_track_as_the_first() -
     stroke = Stroke(tool="push", samples=((30, 0.5, 0.5, 1.0), (49, 0.6, 0.5, 1.0)), repeat=3, every=40)
     found = [(block.start, block.end) for block in Lanes().blocks(Recipe(stroke=(stroke,), duration=4.0), 0.5)]
     assert found == [(30, 50), (70, 90), (110, 130)]
+
+
+@pytest.mark.parametrize(("repeat", "blocks"), [(MOST_BLOCKS, MOST_BLOCKS), (MOST_BLOCKS + 1, 1)])
+def test_what_repeats_too_often_to_be_told_apart_is_one_block_from_its_first_time_to_its_last(
+    repeat: int, blocks: int
+) -> None:
+    stroke = Stroke(tool="push", samples=((30, 0.5, 0.5, 1.0), (49, 0.6, 0.5, 1.0)), repeat=repeat, every=40)
+    found = Lanes().blocks(Recipe(stroke=(stroke,), duration=200.0), 0.5)
+    assert len(found) == blocks
+    assert (found[0].start, found[-1].end) == (30, 50 + 40 * (repeat - 1))
 
 
 @pytest.mark.parametrize("seed", range(2))

@@ -18,8 +18,10 @@ from app.model.schema import frozen
 from app.model.strokes import Stroke
 from app.work.replay import Replay
 from solver.gl.device import Device
+from solver.grid import Grid
 from solver.resample.sampler import Sampler
 from solver.warp.distortion import MapStatistics, distortion
+from solver.warp.map import WarpMap
 from solver.warp.scaled import ScaledMap
 from support.commands import Run
 
@@ -126,6 +128,25 @@ def test_none_of_it_and_all_of_it_are_exact_and_what_is_between_is_even(device: 
     assert max(steps) < 2 * np.mean(steps)
     scaled.release()
     replay.release()
+
+
+@pytest.mark.parametrize("amount", [0.5, 1.0, 1.5])
+def test_a_part_is_drawn_only_where_it_is_asked_for(device: Device, amount: float) -> None:
+    """Each texel of it is what it is in the whole."""
+    warp, bands, step = WarpMap(device, Grid(12, 8), (60, 40)), [(0, 3, 60, 5), (10, 20, 7, 9)], (1 / 60, 1 / 40)
+    y, x = (np.mgrid[:40, :60] + 0.5) / 60
+    warp.set(0.1 * np.stack([np.sin(9 * y + x), np.cos(7 * x)], axis=-1))
+    scaled, asked = ScaledMap(warp, amount), np.zeros((40, 60), bool)
+    whole, part = (device.field((60, 40), 2, name) for name in ("whole", "part"))
+    scaled.draw(whole, (0, 0), step)
+    part.clear(7.0, 7.0)
+    scaled.draw(part, (0, 0), step, regions=bands)
+    for left, top, width, height in bands:
+        asked[top : top + height, left : left + width] = True
+    assert np.array_equal(part.get()[asked], whole.get()[asked])
+    assert (part.get()[~asked] == 7).all()
+    for made in (whole, part, scaled, warp):
+        made.release()
 
 
 def test_it_is_the_same_whichever_way_a_tick_is_reached(device: Device) -> None:

@@ -63,6 +63,37 @@ def test_bloat_doubles_its_exponent_in_a_second(device: Device, tool: str, sign:
         assert rate == pytest.approx(sign * pressure * 2.0 * (1 - math.pi * 0.2**2 / 4 / 0.75), rel=0.01)
 
 
+@pytest.mark.parametrize("tool", ["push", "twirl", "bloat", "pinch"])
+@pytest.mark.parametrize("pressures", [(0.2, 0.6, 1.0), (1.0, 0.6, 0.2)], ids=["rising", "falling"])
+def test_several_pressures_in_one_tick_carry_the_fluid_as_their_mean(
+    device: Device, tool: str, pressures: tuple[float, ...]
+) -> None:
+    """Of each piece of the way that is the mean of its ends, and of the tick that of its pieces."""
+    flows = []
+    for each in (pressures, (0.6, 0.6, 0.6)):
+        samples = tuple((0, x, 0.5, p) for x, p in zip((0.45, 0.5, 0.55), each, strict=True))
+        with replayed(device, tool, (0, 1.0), samples=samples) as replay:
+            replay.seek(1)
+            flows.append(replay.fluid.velocity_at_centres())
+    assert np.abs(flows[1]).max() > 1e-3
+    assert np.abs(flows[0] - flows[1]).max() < 1e-5 * np.abs(flows[1]).max()
+
+
+@pytest.mark.parametrize(("tool", "mask", "part"), [("freeze", "frozen", 1.0), ("thicken", "thickness", 0.5)])
+def test_several_pressures_in_one_tick_paint_a_mask_piece_by_piece(
+    device: Device, tool: str, mask: str, part: float
+) -> None:
+    """As in ticks of their own; what takes time has a part of the tick for each."""
+    ways, painted = ((0, 0.3, 0.5, 0.0), (1, 0.5, 0.5, 0.4), (2, 0.7, 0.5, 1.0)), []
+    for samples, strength in ((ways, part), (tuple((0, *rest) for _, *rest in ways), 1.0)):
+        with replayed(device, tool, (0, 1.0), samples=samples, strength=strength, radius=0.05) as replay:
+            replay.seek(3)
+            painted.append(getattr(replay.masks, mask).get())
+    row = painted[1][painted[1].shape[0] // 2]
+    assert row[len(row) * 2 // 5] < row[len(row) * 3 // 5]
+    assert np.abs(painted[0] - painted[1]).max() < 1e-3 * painted[1].max()
+
+
 def test_a_curve_blows_at_half_a_side_a_second(device: Device) -> None:
     samples = ((0, 0.3, 0.5, 1.0), (0, 0.7, 0.5, 1.0))
     with replayed(device, "curve", (0, 1.0), viscosity=1e-4, samples=samples) as replay:

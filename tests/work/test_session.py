@@ -20,10 +20,12 @@ from app.model.handles import RecipeHandle
 from app.model.mask_edits import LONGEST_HAND, InvertMask, MaskStroke, mask_edit
 from app.model.presets import FEELS, HONEY, PUTTY, WATER, Feel
 from app.model.recipe import Recipe
+from app.model.sampling import Point
 from app.model.strokes import FINEST_DETAIL, BrushPath, Stroke
 from app.model.tools import TOOL, TOOLS, BrushSettings, Press
 from app.progress import Progress
 from app.work.export import run
+from app.work.gesture import kept_near
 from app.work.handle_status import FIT
 from app.work.jobs import Job, MapOutput, Outputs
 from app.work.replay import Replay
@@ -821,3 +823,14 @@ def test_a_push_that_stays_holds_a_fluid_that_moves(session: Session) -> None:
     paint(session, "push", (0.55, 0.5), (0.55, 0.5), ticks=6)
     assert len(session.recipe.stroke) == 2
     assert session.replay.fluid.motion().largest_speed < 0.9 * speed
+
+
+@pytest.mark.parametrize(
+    ("given", "kept"),
+    [
+        ((0.123456, 0.654321), (0.12346, 0.65432)), ((-0.4, 1.4), (-0.4, 1.4)), ((-0.6, 0.5), (-0.5, 0.5)),
+        ((1.6, 0.5), (1.5, 0.5)), ((0.5, -0.6), (0.5, -0.5)), ((0.5, 1.6), (0.5, 1.5)),
+    ],
+)  # fmt: skip
+def test_places_are_kept_half_a_picture_around_it_to_five_digits(given: Point, kept: Point) -> None:
+    assert kept_near(*given) == kept
