@@ -82,9 +82,10 @@ def here(folder: Path) -> set[str]:
 # -- what works -------------------------------------------------------------------------------------------------------
 
 
-def test_a_picture_twice_is_the_same_bytes(folder: Path):
-    for name in ("one.png", "two.png"):
-        ran = process(folder, "render", "a.toml", "-o", name)
+def test_a_picture_twice_is_the_same_bytes(folder: Path, fluidwarp: Run):
+    """In a process of its own and in this one, whose driver draws without threads."""
+    for name, render in (("one.png", process), ("two.png", fluidwarp)):
+        ran = render(folder, "render", "a.toml", "-o", name)
         assert (ran.returncode, ran.stdout, ran.stderr) == (0, "", "")
     assert (folder / "one.png").read_bytes() == (folder / "two.png").read_bytes()
     before, after = read_picture(folder / "cat.png").pixels, read_picture(folder / "one.png").pixels
