@@ -376,11 +376,12 @@ def _perform(piece: Piece, given: list[Path], jobs: int, cluster: str | None, gp
     output = piece.outputs.file
     if len(given) > 1 or cluster is not None or (given and output and _is_folder(output)):
         pieces = spread(piece, given)
-        with no_empty_folder(pieces[0].folder):
+        with no_empty_folder(pieces[0].folder), no_empty_folder(piece.outputs.states):
             _perform_many(pieces, jobs, cluster, verbose)
         return
     piece = piece.named()
-    with ExitStack() as stack, on_terminal(piece.outputs.files[0].name, None) as progress:
+    states = no_empty_folder(piece.outputs.states)
+    with states, ExitStack() as stack, on_terminal(piece.outputs.files[0].name, None) as progress:
         report = piece.perform(lambda: stack.enter_context(Device.headless()), progress)
     _tell(*report.notices, *([report.verdict] if report.verdict else []))
 
@@ -669,11 +670,12 @@ def gallery(
     """Render the figures of the paper and of the guide: results, animations and contact sheets."""
     _check_output(output)
     from app.gallery import figures, retouching
+    from app.media.files import no_empty_folder
     from app.progress import on_terminal
     from solver.gl.device import Device
 
     _choose(gpu)
-    with on_terminal("gallery", None) as progress, Device.headless() as device:
+    with no_empty_folder(output), on_terminal("gallery", None) as progress, Device.headless() as device:
         measured = (retouching if strokes else figures).make(device, output, progress)
     for figure, numbers in measured.items():
         print(f"{figure}: {', '.join(f'{name} {number}' for name, number in numbers.items())}")

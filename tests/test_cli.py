@@ -730,13 +730,25 @@ def test_a_fit_does_not_take_the_place_of_its_recipe(folder: Path, fluidwarp: Ru
     assert (folder / "a.toml").read_bytes() == before
 
 
-def test_interrupted_leaves_nothing(folder: Path):
-    """As a user does it: Ctrl+C in the middle of a long animation."""
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["render", "long.toml", "-o", "x.mp4"],
+        ["render", "long.toml", "-o", "x.mp4", "--states", "new/states"],
+        ["gallery", "-o", "new/gallery"],
+    ],
+    ids=["render", "states", "gallery"],
+)
+def test_interrupted_leaves_nothing(folder: Path, words: list[str]):
+    """As a user does it: Ctrl+C in the middle of a long animation, and before anything lasting is in a folder."""
     import signal
 
-    (folder / "long.toml").write_text(RECIPE.replace("duration = 0.2", "duration = 2000"))
+    long = RECIPE.replace("duration = 0.2", "duration = 2000")
+    if "--states" in words:  # 64 ticks, after which there is one to keep, take long
+        long = long.replace("grid = 32", "grid = 512")
+    (folder / "long.toml").write_text(long)
     started = subprocess.Popen(
-        [sys.executable, "-m", "app", "render", "long.toml", "-o", "x.mp4"],
+        [sys.executable, "-m", "app", *words],
         cwd=folder,
         env=os.environ | {"PYTHONPATH": str(ROOT)},
         stderr=subprocess.PIPE,
@@ -752,6 +764,26 @@ def test_interrupted_leaves_nothing(folder: Path):
     assert started.returncode == cli.INTERRUPTED
     assert told == "fluidwarp: cancelled; nothing half-written is left\n"
     assert here(folder) == before
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits a process as Linux does")
+@pytest.mark.parametrize(
+    ("limit", "said"),
+    [
+        ("n 8", "fluidwarp: ffmpeg cannot be started: more files would be open than may be; allow more, as by: "),
+        ("v 200000", "; this process may have 195 MB of memory (ulimit -v), which may be too little for a driver\n"),
+    ],
+)
+def test_what_a_process_may_not_have_is_not_told_as_missing(folder: Path, limit: str, said: str):
+    """Neither ffmpeg nor OpenGL, which a person would install once more."""
+    words = ["python", "-c", "from app.media.ffmpeg import ask; ask()"]
+    if limit.startswith("v"):
+        words = ["python", "-c", "from solver.gl.device import Device; Device.headless()"]
+    words[0] = sys.executable
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1"}
+    limited = ["sh", "-c", f'ulimit -{limit}; exec "$@"', "sh", *words]
+    ran = subprocess.run(limited, cwd=folder, env=environment, capture_output=True, text=True)
+    assert said.removeprefix("fluidwarp: ") in ran.stderr
 
 
 @pytest.mark.parametrize("moment", ["while modules are loaded", "before a job has begun", "with something half done"])

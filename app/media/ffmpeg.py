@@ -18,6 +18,8 @@ from app.errors import Cancelled, UserError
 from app.media.files import cannot_write
 from app.progress import beginning, if_abandoned, never
 
+MERE_NEWS = r"(\[[^\]]*\] )*\[(info|warning)\] "
+PIPES = 4  # to a process: its input, output and complaints, and one by which Python hears that it has begun
 PATIENCE = 0.1  # seconds between two looks at the wish to stop
 
 
@@ -26,6 +28,7 @@ def executable() -> str:
     """Path of ffmpeg; raises `UserError` when there is none for this machine."""
     import imageio_ffmpeg
 
+    _check_room()
     try:
         found = imageio_ffmpeg.get_ffmpeg_exe()
     except RuntimeError as error:
@@ -35,6 +38,22 @@ def executable() -> str:
     except (OSError, subprocess.CalledProcessError):  # what the variable names is taken as it is
         raise UserError(f"{found} is no ffmpeg that runs here; set IMAGEIO_FFMPEG_EXE to one, or to nothing.") from None
     return found
+
+
+def _check_room() -> None:
+    """Raise `UserError` if this process may not open what one of ffmpeg's needs: imageio-ffmpeg says it is missing."""
+    pipes = list[int]()
+    try:
+        for _ in range(PIPES):
+            pipes += os.pipe()
+    except OSError as error:
+        if error.errno not in (errno.EMFILE, errno.ENFILE):
+            raise
+        mend = "allow more, as by: ulimit -n 256"
+        raise UserError(f"ffmpeg cannot be started: more files would be open than may be; {mend}.") from None
+    finally:
+        for pipe in pipes:
+            os.close(pipe)
 
 
 @functools.cache
@@ -172,8 +191,8 @@ class Ffmpeg:
 
     def complaint(self) -> str:
         """The first thing it has complained of, without a full stop; "" if nothing."""
-        bad = re.findall(r"^(?:\[[^\]]*\] )*\[(?:error|fatal|panic)\] +(\S.*)", self._said(), re.MULTILINE)
-        lines = [re.sub(r"^(\[[^\]]*\] )+", "", line).strip() for line in bad]
+        said = [line for line in self._said().splitlines() if line.strip() and not re.match(MERE_NEWS, line)]
+        lines = [re.sub(r"^(\[[^\]]*\] )+", "", line).strip() for line in said]
         return lines[0].rstrip(".") if lines else ""  # the reason stands first, its consequences follow it
 
     def sizes(self) -> list[str]:

@@ -7,6 +7,7 @@ import os
 import re
 import shutil
 import stat
+import tempfile
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
@@ -123,12 +124,17 @@ def make_folder(path: Path) -> None:
 def no_empty_folder(path: Path | None) -> Iterator[None]:
     """When the block ends, a folder that was not there before it, or a part of the way there, goes if it is empty."""
     new = [] if path is None else [folder for folder in (path, *path.parents) if not folder.exists()]
-    try:
-        yield
-    finally:
+
+    def remove() -> None:
         with suppress(OSError):  # as of one that is not empty
             for folder in new:
                 folder.rmdir()
+
+    with if_abandoned(remove):
+        try:
+            yield
+        finally:
+            remove()
 
 
 def check_folder(path: Path) -> None:
@@ -284,6 +290,16 @@ def _is_one(path: str | os.PathLike[str], other: str | os.PathLike[str]) -> bool
     try:
         return os.path.samefile(path, other)
     except OSError:  # one of them is not there
+        return False
+
+
+def ignores_capitals(folder: Path) -> bool:
+    """Whether names that differ in capitals alone are the same, on the disk of a folder that may have to be made."""
+    there = next(parent for parent in (folder.absolute(), *folder.absolute().parents) if parent.is_dir())
+    try:
+        with tempfile.NamedTemporaryFile(dir=there, prefix=".fluidwarp-") as probe:
+            return os.path.exists(there / Path(probe.name).name.upper())
+    except OSError:  # nothing can be written there, as will be told
         return False
 
 

@@ -15,6 +15,7 @@ from app.media.encoders import ANIMATIONS
 from app.media.files import (
     check_folder,
     check_kept,
+    ignores_capitals,
     is_sequence,
     make_folder,
     stands_for_files,
@@ -229,6 +230,7 @@ def _check_apart(tasks: Sequence[Piece]) -> None:
     pictures = {os.path.realpath(task.picture): task.picture for task in tasks if task.picture is not None}
     sequences = [real for real in pictures if stands_for_files(real)]
     seen: dict[str, Path | None] = {}
+    folded: dict[str, str] = {}
     for task in tasks:
         task.check_names([] if task.picture is None else [task.picture])
         for path in task.outputs.files:
@@ -239,6 +241,9 @@ def _check_apart(tasks: Sequence[Piece]) -> None:
                     raise UserError(f"{pictures[other]} would be replaced by what {task.picture} becomes; rename one")
             if real in seen:
                 raise UserError(f"{seen[real]} and {task.picture} would both become {path}; rename one")
+            alike = folded.setdefault(real.casefold(), real)
+            if alike != real and os.path.dirname(alike) == os.path.dirname(real) and ignores_capitals(path.parent):
+                raise UserError(f"{seen[alike]} and {task.picture} would both become {path} on this disk; rename one")
             seen[real] = task.picture
     for pattern in filter(is_sequence, seen):
         for path, picture in seen.items():

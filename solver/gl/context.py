@@ -80,6 +80,16 @@ def _chosen_gpu() -> int | None:
     return int(said)
 
 
+def _most_memory() -> int | None:
+    """Bytes of addresses that this process may have; None where that is not limited, or not known."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return None
+    most, _ = resource.getrlimit(resource.RLIMIT_AS)
+    return None if most == resource.RLIM_INFINITY else most
+
+
 class Context:
     """One GL context, what it can do, and the framebuffers on its textures.
 
@@ -145,6 +155,9 @@ class Context:
                 return cls(ctx, owns_context=True)
         hint = f"; {INSTALL_HINT}" if sys.platform.startswith("linux") else ""
         where = "" if gpu is None else f" on graphics device {gpu}"
+        if (most := _most_memory()) is not None:
+            little = "which may be too little for a driver"
+            hint = f"; this process may have {most >> 20} MB of memory (ulimit -v), {little}"
         raise ContextError(f"no OpenGL 3.3 without a window{where} ({', '.join(dict.fromkeys(reasons))}){hint}")
 
     def framebuffer(self, textures: tuple[moderngl.Texture, ...]) -> moderngl.Framebuffer:

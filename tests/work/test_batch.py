@@ -688,6 +688,20 @@ def test_a_link_among_states_is_not_followed(folder: Path):
     assert contents(folder / "a") == contents(folder / "b")
 
 
+def test_two_results_whose_names_differ_in_capitals_alone(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """They are one file on most disks of macOS and Windows, and the one picture replaced the other without a word."""
+    names = [folder / "p.png", folder / "P.png", folder / "p.jpg"]
+    assert not files.ignores_capitals(folder / "new")
+    assert len(tasks(folder, names)) == 3
+    exists = os.path.exists
+    monkeypatch.setattr(os.path, "exists", lambda path: exists(Path(path).with_name(Path(path).name.lower())))
+    assert files.ignores_capitals(folder / "new")
+    with pytest.raises(UserError, match=r"p\.png and .*P\.png would both become .*P\.png on this disk; rename one"):
+        tasks(folder, names)
+    assert len(tasks(folder, names[1:])) == 2
+    assert not [path.name for path in folder.iterdir() if path.name.startswith(".fluidwarp-")]
+
+
 def test_where_nothing_is_written_no_folder_is_left(folder: Path, fluidwarp: Run) -> None:
     """Also of what fails once its picture is read; but one that was there stays, and so does what others put there."""
     np.save(folder / "square.npy", np.zeros((20, 20, 2), np.float32))
