@@ -328,7 +328,7 @@ def test_imguis_own_widgets_look_as_is_written_down(name: str, scale: float, gol
 
 def test_every_action_does_what_is_written_down(device: Device, tmp_path: Path, golden: dict[str, list[str]]) -> None:
     """One after the other, on a work of two strokes and a handle, the playhead in the middle."""
-    robot, found = Robot(device, small_project(tmp_path), (400, 300), sees=True), list[str]()
+    robot, found = Robot(device, small_project(tmp_path), (400, 300)), list[str]()
     editor = robot.editor
     try:
         robot.editor.commands.clipboard = lambda text: None
