@@ -187,15 +187,6 @@ def test_what_is_fitted_anew_is_waited_for_as_before(device: Device):
     assert fit(device, PAIRS, 1, recipe).trial.recipe.stop.handles_within == 0.0005
 
 
-def test_a_bent_line_that_is_longer_than_any_reach_is_fitted(device: Device):
-    """One of seven longer sides was given a radius of more than 1, which no handle has."""
-    points = [[0.2 + 0.6 * (k % 2), 0.2 + 0.05 * k] for k in range(12)]
-    goals = [[x, y + 0.02 * x] for x, y in points]
-    line = f"[[handle]]\npoints = {points}\ngoals = {goals}\nradius = 1.0\nduration = 0.2\n"
-    (handle,) = fit(device, None, 6, FREE + line).trial.recipe.handle
-    assert handle.radius <= 1
-
-
 def test_what_is_frozen_only_at_first_can_be_met(device: Device):
     frozen = '[[mask]]\nkind = "fill"\ntick = 0\nof = "frozen"\namount = 1\n'
     thawed = '[[mask]]\nkind = "clear"\ntick = 2\nof = "frozen"\n'
