@@ -502,7 +502,7 @@ class _Search:
         low, high = zip(*ranges, strict=True)
         self.low = listed(least, low[0], low[1], min(low[2], own))
         # And a line that is bent has as many points that are told where they shall be.
-        bent = np.array([lead.shape.handle.reach if lead.bends else widest for lead in leads])
+        bent = np.array([min(lead.shape.handle.reach, 1.0) if lead.bends else widest for lead in leads])
         self.high = listed(np.where(rings, least, np.maximum(least, bent)), high[0], high[1], max(high[2], own))
         if _flows(base):
             self.low[-1] = self.high[-1] = np.log(own)
