@@ -167,7 +167,7 @@ def close_minimised(desk: Desk) -> None:
     screen.sync()
 
 
-def test_the_window_comes_back_as_it_was_left(desk: Desk, tmp_path: Path) -> None:
+def test_the_window_comes_back_as_it_was_left_and_a_minimised_one_is_closed_at_once(desk: Desk, tmp_path: Path) -> None:
     desk.open_pattern()
     desk.do("windowsize", desk.window, "900", "610", "windowmove", desk.window, "140", "70")
     time.sleep(0.5)
@@ -190,10 +190,6 @@ def test_the_window_comes_back_as_it_was_left(desk: Desk, tmp_path: Path) -> Non
     # The bar is light, and where the inspector was is the ground around the picture.
     desk.until(lambda: desk.seen()[75, 400].min() > 200, "the bar to be light")
     assert (desk.seen()[400, 1030] == 0xD2).all()
-
-
-def test_a_minimised_window_is_closed_at_once(desk: Desk) -> None:
-    desk.open_pattern()
     close_minimised(desk)
     desk.until_gone()
 
@@ -239,7 +235,7 @@ def test_a_file_that_is_not_there_opens_no_window(tmp_path: Path, fluidwarp: Run
     assert len(done.stderr.strip().splitlines()) == 1
 
 
-def test_a_file_dropped_on_the_window(desk: Desk, tmp_path: Path) -> None:
+def test_a_picture_and_a_map_of_another_program_dropped_on_the_window(desk: Desk, tmp_path: Path) -> None:
     other = tmp_path / "Käse 2.png"
     write_picture(other, pattern(100, 60))
     desk.open_pattern()
@@ -253,11 +249,8 @@ def test_a_file_dropped_on_the_window(desk: Desk, tmp_path: Path) -> None:
     time.sleep(0.5)
     assert desk.title() == "pattern - fluidwarp"
 
-
-def test_a_map_of_another_program_dropped_on_the_window(desk: Desk, tmp_path: Path) -> None:
     st_map = tmp_path / "st.exr"
     write_foreign_map(st_map, 240, 180)
-    desk.open_pattern()
     command = [sys.executable, str(Path(__file__).parents[1] / "support" / "dropping.py"), desk.window, str(st_map)]
 
     def use_as_map() -> None:
@@ -267,7 +260,9 @@ def test_a_map_of_another_program_dropped_on_the_window(desk: Desk, tmp_path: Pa
     desk.insist(use_as_map, lambda: desk.title() == "pattern * - fluidwarp", "the map to be taken")
 
 
-def test_sliders_take_a_typed_number_and_their_default(desk: Desk, tmp_path: Path) -> None:
+def test_sliders_take_a_typed_number_and_their_default_and_keys_of_files_work_while_it_is_typed(
+    desk: Desk, tmp_path: Path
+) -> None:
     work = tmp_path / "work.fluidwarp"
     desk.open_pattern()
     desk.save(work)
@@ -277,11 +272,15 @@ def test_sliders_take_a_typed_number_and_their_default(desk: Desk, tmp_path: Pat
         desk.insist(lambda: desk.key("ctrl+s"), lambda: desk.title() == "work - fluidwarp", "it to be saved")
         return projects.load(work).recipe.fluid.viscosity
 
-    def type_number() -> None:
+    def leave_typed(text: str) -> None:
+        """Type a number, and leave it so."""
         hold, let_go = ("keydown", "ctrl", "sleep", "0.2"), ("sleep", "0.2", "keyup", "ctrl", "sleep", "0.5")
         desk.do("mousemove", "1128", "159", "sleep", "0.3", *hold, "click", "1", *let_go)
         desk.key("ctrl+a")
-        desk.type("1.25")
+        desk.type(text)
+
+    def type_number() -> None:
+        leave_typed("1.25")
         desk.key("Return")
 
     def click_twice() -> None:
@@ -292,21 +291,8 @@ def test_sliders_take_a_typed_number_and_their_default(desk: Desk, tmp_path: Pat
     desk.insist(type_number, lambda: viscosity() == pytest.approx(1.25), "the number to be taken")
     desk.insist(click_twice, lambda: viscosity() == pytest.approx(0.03), "the default to be taken")
 
-
-def test_keys_of_files_work_while_a_number_is_typed(desk: Desk, tmp_path: Path) -> None:
-    work = tmp_path / "work.fluidwarp"
-    desk.open_pattern()
-    desk.save(work)
-
-    def type_number(text: str) -> None:
-        """Type it, and leave it so."""
-        hold, let_go = ("keydown", "ctrl", "sleep", "0.2"), ("sleep", "0.2", "keyup", "ctrl", "sleep", "0.5")
-        desk.do("mousemove", "1128", "159", "sleep", "0.3", *hold, "click", "1", *let_go)
-        desk.key("ctrl+a")
-        desk.type(text)
-
     def save() -> None:
-        type_number("1.25")
+        leave_typed("1.25")
         desk.key("ctrl+s")
         time.sleep(1)
 
@@ -316,7 +302,7 @@ def test_keys_of_files_work_while_a_number_is_typed(desk: Desk, tmp_path: Path) 
     desk.until(lambda: desk.title() == "work * - fluidwarp", "the push to be recorded")
 
     def export() -> None:
-        type_number("0.5")
+        leave_typed("0.5")
         desk.ask("ctrl+e")
         desk.key("Return")
         desk.until((tmp_path / "work warped.png").exists, "the export")
