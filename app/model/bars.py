@@ -169,6 +169,11 @@ def with_changed(recipe: Recipe, which: Collection[Which], changed: Changed) -> 
     ends += [one.last / dt + max(recipe.ticks - last, 0) for one in others if isinstance(one, RecipeHandle)]
     here = [after, *(change.tick for change in recipe.change), *(edit.tick - 1 for edit in recipe.mask)]
     ticks = max(ticks, 1 + max(here), *(ceil(end - 1e-6) for end in ends), 1)
+    check_length(ticks)
+    return parts | {"duration": recipe.duration if ticks == recipe.ticks else ticks * dt}
+
+
+def check_length(ticks: int) -> None:
+    """Raise `UserError` if a recording of so many ticks would be longer than a recipe may be."""
     if ticks > MOST_TICKS:
         raise UserError(f"a recording has at most {MOST_TICKS} ticks, and this would be of {ticks}")
-    return parts | {"duration": recipe.duration if ticks == recipe.ticks else ticks * dt}

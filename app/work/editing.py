@@ -8,7 +8,7 @@ from typing import Any
 
 from app.errors import UserError
 from app.media.project import Project
-from app.model.bars import Changed, Which, with_changed
+from app.model.bars import Changed, Which, check_length, with_changed
 from app.model.edits import check_size, with_change, with_led
 from app.model.handles import RecipeHandle, RecipePin
 from app.model.mask_edits import MaskEdit
@@ -114,7 +114,11 @@ class Editing(Painting):
     def edit_held(self, name: str, label: str, commit: bool = True, **settings: Any) -> None:
         """Set something about the handle or pin that messages call so, from its start on, and let it arrive.
 
-        `commit`: as an entry of the history; not while a slider is dragged.
+        Args:
+            commit: as an entry of the history; not while a slider is dragged.
+
+        Raises:
+            UserError: if it would take too long to arrive.
         """
 
         def changed(led: RecipeHandle | RecipePin) -> RecipeHandle | RecipePin:
@@ -124,7 +128,8 @@ class Editing(Painting):
         parts = with_led(self._live, label, changed)
         last = max((handle.last for handle in parts["handle"] if handle.turns), default=0.0)
         if lasts := last > self._base.duration:
-            parts["duration"] = (ceil(last / self.dt) + 1) * self.dt
+            check_length(ticks := ceil(last / self.dt) + 1)
+            parts["duration"] = ticks * self.dt
         self.preview(**parts)
         if lasts:
             self._send(self.end)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from app.errors import UserError
 from app.media import project as projects
 from app.media.pictures import read_picture
 from app.model.handles import ARRIVED, MOST_HANDLES, MOST_LINES
@@ -167,6 +168,16 @@ def test_a_handle_is_turned_in_the_inspector_and_arrives(robot: Robot) -> None:
     ring = session.replay.handles.shapes[0]
     arms = (ring[1:] - ring[0]) @ [1, 1j] * np.exp(-1j * np.arange(6) * np.pi / 3)
     assert np.degrees(np.angle(arms.sum())) == pytest.approx(40, abs=1)
+
+
+def test_a_turn_that_would_end_later_than_a_recipe_may_is_refused(robot: Robot) -> None:
+    robot.click(*robot.at(0.4, 0.5))
+    robot.rest()
+    session = robot.editor.session
+    before = session.recipe
+    with pytest.raises(UserError, match="at most 1000000 ticks"):
+        session.edit_held("Turn of a handle", "handle[1]", rotate=40.0, start=1e6 * session.dt)
+    assert session.recipe == before
 
 
 @pytest.mark.parametrize("previews", [1, 2])
