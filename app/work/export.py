@@ -175,10 +175,11 @@ class _Export:
 
     def _note_losses(self) -> None:
         """What the user should know of the last warp, and of what the output cannot hold."""
-        if self.recipe.mode == "coordinates" and (distortion := self.replay.seen.statistics()).folds:
+        every = self.replay.warp.size
+        if self.recipe.mode == "coordinates" and (distortion := self.replay.seen.statistics(every)).folds:
             said = f"the warp folds over itself in {distortion.folds} of {distortion.places} places"
             amount = self.recipe.amount
-            only_here = amount != 1 and not self.replay.warp.statistics().folds
+            only_here = amount != 1 and not self.replay.warp.statistics(every).folds
             self.pictures.notice(f"{said} at an amount of {amount:g}, and in none at 1" if only_here else said)
         missed = list(unmet(self.replay, ARRIVED))
         for each in missed:

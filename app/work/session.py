@@ -82,15 +82,16 @@ class Session(Playing):
     @property
     def folds(self) -> tuple[int, int]:
         """In how many places the warp folds over itself as it is seen at this moment, and of how many: two a cell along
-        each axis, or as many as an export looks at.
+        each axis, if these are not too many to be looked at in a frame.
 
-        Reads back from the GPU; an export, which may take longer, looks at more of them.
+        Reads back from the GPU; an export, which may take longer, looks at each texel of the map.
         """
         seen = self.replay.seen
         if seen.is_untouched:
             return 0, 0
         width, height = seen.coarse_size
-        found = self._once("folds", (seen, seen.version), lambda: seen.statistics((2 * width, 2 * height)))
+        size = self.replay.warp.bounded((2 * width, 2 * height))
+        found = self._once("folds", (seen, seen.version), lambda: seen.statistics(size))
         return found.folds, found.places
 
     def divergence(self) -> float:

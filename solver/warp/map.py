@@ -26,7 +26,7 @@ from solver.params import Walls
 from solver.state import State
 from solver.trace import MOST_PARTS, Tracing
 from solver.warp.accumulated import LEAST_TEXELS, AccumulatedMap
-from solver.warp.distortion import MapStatistics, distortion
+from solver.warp.distortion import MOST_PLACES, MapStatistics, distortion
 from solver.warp.factors import Factors
 from solver.warp.frozen import Frozen
 from solver.warp.prescribed import traced
@@ -51,7 +51,6 @@ from solver.warp.state import (
 from solver.warp.submap import STEEPEST, Level, Submap, away_from_held, defines_of, images_of, inputs_of, window_of
 
 CHECK_EVERY = 2  # steps between two looks at how far the map is bent: a quick push bends it by 1 in two
-MOST_PLACES = 2**19  # at which all of it is looked at, at most
 
 
 class WarpMap:
@@ -589,10 +588,10 @@ class WarpMap:
     def statistics(self, size: tuple[int, int] | None = None, amount: float = 1.0) -> MapStatistics:
         """How the whole map distorts, measured on a lattice of `size`; waits for the GPU.
 
-        By default it has a place for each texel of the accumulated map; it is `bounded`. `amount`: of the map, scaled
+        By default it has a place for each texel of the accumulated map, and is `bounded`. `amount`: of the map, scaled
         as one displacement; see `ScaledMap`.
         """
-        size = self.bounded(size or self.size)
+        size = size or self.bounded(self.size)
         defines, parts = self._held_defines(), self._parts()
         if amount != 1:
             defines, parts = defines | {"PART": 1}, parts | {"amount": amount}

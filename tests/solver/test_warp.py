@@ -448,6 +448,26 @@ def test_a_large_map_is_measured_at_as_many_of_its_texels_as_may_be(
     warp.release()
 
 
+def test_a_fold_between_the_places_that_a_large_map_is_measured_at_is_found_at_all_of_its_texels(
+    device: Device, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In bands, each of at most so many places, as all at once."""
+    size, most = (128, 96), 128 * 96 // 9
+    warp = WarpMap(device, Grid.for_picture(*size, 32), size)
+    given = np.zeros((96, 128, 2))
+    given[46:48, 60:62, 0] = [[1.5 / 128, -1.5 / 128]] * 2
+    warp.set(given)
+    at_once = warp.statistics(size)
+    assert at_once.folds > 0
+    for module in ("map", "distortion"):
+        monkeypatch.setattr(f"solver.warp.{module}.MOST_PLACES", most)
+    assert warp.statistics().places <= most
+    in_bands = warp.statistics(size)
+    assert vars(in_bands) == pytest.approx(vars(at_once), rel=1e-5)
+    assert in_bands.folds > warp.statistics().folds * 9
+    warp.release()
+
+
 def test_a_map_of_any_size_is_taken_over(device: Device) -> None:
     warp = WarpMap(device, Grid(40, 24))
     for size in ((40, 24), (80, 48), (123, 77)):

@@ -32,7 +32,7 @@ from app.work.replay import Replay
 from app.work.session import Session
 from solver.gl.device import Device
 from solver.warp.distortion import MapStatistics
-from solver.warp.map import MOST_PLACES
+from solver.warp.distortion import MOST_PLACES
 from support.editing import small_project
 from support.gl_objects import Made
 
@@ -68,7 +68,7 @@ def paint(
     session.release()
 
 
-def test_what_a_small_brush_folds_is_looked_for_at_no_more_places_than_an_export_looks_at(session: Session) -> None:
+def test_what_a_small_brush_folds_is_looked_for_at_no_more_places_than_a_frame_has_time_for(session: Session) -> None:
     """Two a cell of its window all over the picture were 17 million for a brush of a 200th, and no texture for less."""
     session.begin_with(viscosity=1.0, drag=12.0)
     stroke = Stroke(tool="push", radius=0.0002, detail=FINEST_DETAIL, samples=((0, 0.5, 0.5, 1), (3, 0.5003, 0.5, 1)))
