@@ -94,7 +94,7 @@ class Ffmpeg:
         self._label, self._doing, self._cancel = label, doing, cancel
         self._complaints = tempfile.TemporaryFile()  # noqa: SIM115 - closed in __exit__; a pipe could fill and block
         self._ending = ExitStack()
-        command = [executable(), "-hide_banner", "-nostats", "-loglevel", f"+level+{level}", "-y", *arguments]
+        command = [executable(), "-hide_banner", "-nostats", "-loglevel", f"+repeat+level+{level}", "-y", *arguments]
         with beginning():
             self._process = subprocess.Popen(
                 command,

@@ -123,7 +123,7 @@ def make_folder(path: Path) -> None:
 @contextmanager
 def no_empty_folder(path: Path | None) -> Iterator[None]:
     """When the block ends, a folder that was not there before it, or a part of the way there, goes if it is empty."""
-    new = [] if path is None else [folder for folder in (path, *path.parents) if not folder.exists()]
+    new = [] if path is None else [folder for folder in (path, *path.parents) if not os.path.exists(folder)]
 
     def remove() -> None:
         with suppress(OSError):  # as of one that is not empty

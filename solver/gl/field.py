@@ -22,6 +22,13 @@ class FieldError(ValueError):
     """A field of an impossible size, or data that does not fit it."""
 
 
+def whole(size: tuple[int, int], label: str) -> tuple[int, int]:
+    """A size that is (width, height) in whole texels. Raises `FieldError`."""
+    if not (isinstance(size, Sized) and len(size) == 2 and all(isinstance(side, Integral) for side in size)):
+        raise FieldError(f"{label}: a size of {size!r} was given, (width, height) in whole texels is wanted")
+    return size
+
+
 class Field:
     """One texture, with a framebuffer once it is drawn into or read back: nearest filtering, clamped to the edge.
 
@@ -44,9 +51,7 @@ class Field:
         dtype: str = "f4",
         cleared: bool = True,
     ) -> None:
-        if not (isinstance(size, Sized) and len(size) == 2 and all(isinstance(side, Integral) for side in size)):
-            raise FieldError(f"{label}: a size of {size!r} was given, (width, height) in whole texels is wanted")
-        width, height = size
+        width, height = whole(size, label)
         limit = device.limits.max_texture_size
         # A texture that is too large, or empty, is returned without an error and fails much later.
         if not (1 <= width <= limit and 1 <= height <= limit):

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from solver.gl.device import Device
+from solver.gl.field import whole
 from solver.gl.reduction import Reduction
 
 MOST_PLACES = 2**19  # looked at at once
@@ -42,7 +43,7 @@ def distortion(
 
     Looked at in bands of at most `MOST_PLACES`, or of a row, so that no size takes more memory.
     """
-    width, height = size
+    width, height = whole(size, "distortion")
     rows = max(MOST_PLACES // width, 1)
     largest, total, step = np.full(3, -np.inf), np.zeros(3), (1 / width, 1 / height)
     draw = device.pass_("warp/distortion.frag", **defines)
