@@ -67,7 +67,8 @@ def test_what_is_told_goes_by_itself_and_what_is_explained_comes_to_a_pointer_th
     before = still(desk)
     desk.key("ctrl+shift+c")
     desk.until(lambda: differs(desk.seen(), before, 640, 50, 1000, 130), "the message")
-    desk.do("mousemove", "1140", "778")  # it stays until somebody is there, and may have come after the keys were let go
+    # It stays until somebody is there, and on a slow machine comes after the keys were let go.
+    desk.do("mousemove", "1140", "778")
     desk.until(lambda: not differs(desk.seen(), before, 640, 50, 1000, 130), "the message to go")
     desk.do("mousemove", "24", "400")
     time.sleep(RESTED)

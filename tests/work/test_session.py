@@ -31,8 +31,7 @@ from app.work.jobs import Job, MapOutput, Outputs
 from app.work.replay import Replay
 from app.work.session import Session
 from solver.gl.device import Device
-from solver.warp.distortion import MapStatistics
-from solver.warp.distortion import MOST_PLACES
+from solver.warp.distortion import MOST_PLACES, MapStatistics
 from support.editing import small_project
 from support.gl_objects import Made
 
