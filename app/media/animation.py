@@ -26,7 +26,7 @@ from app.media.depth import to_bits
 from app.media.encoders import ANIMATIONS, SIX_BITS, Container, Encoding, Stream, check_animation, lossless
 from app.media.files import cannot_write, is_sequence, numbered, replacing, temporary_beside, temporary_file
 from app.media.pictures import write_picture
-from app.media.video import begins_below_zero, sound_tracks
+from app.media.video import sound_tracks
 from app.model.picture import Picture
 from app.progress import never
 
@@ -263,11 +263,12 @@ def _sound(
     sound, start = how.sound, how.sound_from
     if sound is None or not container.sound:
         return [], []
-    tracks = [(number, track) for number, track in enumerate(sound_tracks(sound)) if track.codec != "none"]
+    found, is_early = sound_tracks(sound)
+    tracks = [(number, track) for number, track in enumerate(found) if track.codec != "none"]
     if not tracks:
         return [], []
     begin = ["-ss", f"{start:.6f}"] if start else []
-    if begins_below_zero(sound):
+    if is_early:
         chosen = [word for place, _ in tracks for word in ("-map", f"0:a:{place}")]
         ffmpeg.run(["-i", f"file:{sound}", *chosen, "-c", "copy", f"file:{spool}"], str(spool), cancel=cancel)
         # With the pictures' own times, which begin at 0 now: the sound may begin later.

@@ -18,7 +18,7 @@ from app.errors import Cancelled, UserError
 from app.media.files import cannot_write
 from app.progress import beginning, if_abandoned, never
 
-MERE_NEWS = r"(\[[^\]]*\] )*\[(info|warning)\] "
+MERE_NEWS = r"(\[[^\]]*\] )*\[(info|warning)\] | *Last message repeated"
 PIPES = 4  # to a process: its input, output and complaints, and one by which Python hears that it has begun
 PATIENCE = 0.1  # seconds between two looks at the wish to stop
 
@@ -94,7 +94,7 @@ class Ffmpeg:
         self._label, self._doing, self._cancel = label, doing, cancel
         self._complaints = tempfile.TemporaryFile()  # noqa: SIM115 - closed in __exit__; a pipe could fill and block
         self._ending = ExitStack()
-        command = [executable(), "-hide_banner", "-nostats", "-loglevel", f"+repeat+level+{level}", "-y", *arguments]
+        command = [executable(), "-hide_banner", "-nostats", "-loglevel", f"+level+{level}", "-y", *arguments]
         with beginning():
             self._process = subprocess.Popen(
                 command,

@@ -334,12 +334,15 @@ class SoundTrack:
     layout: str = ""
 
 
-def sound_tracks(path: str | os.PathLike[str]) -> list[SoundTrack]:
-    """The sound tracks of a file; raises `UserError` when it has neither picture nor sound."""
+def sound_tracks(path: str | os.PathLike[str]) -> tuple[list[SoundTrack], bool]:
+    """The sound tracks of a file, and whether its times begin below 0: there ffmpeg seeks elsewhere, or not at all.
+
+    Raises `UserError` when it has neither picture nor sound.
+    """
     told = _banner(Path(path))
     if "Stream #0" not in told:
         raise UserError(f"Cannot read {path}: there is neither picture nor sound in it; give the name of a clip.")
-    return _sounds(told)
+    return _sounds(told), _is_early(told)
 
 
 def _sounds(told: str) -> list[SoundTrack]:
@@ -371,11 +374,6 @@ def _seconds(told: str) -> float | None:
     start = float(length[4] or 0)
     # Of a Matroska this is when it ends, which counts from 0 whenever it starts, as a recording that went on.
     return seconds - start if "Input #0, matroska" in told and seconds > start else seconds
-
-
-def begins_below_zero(path: str | os.PathLike[str]) -> bool:
-    """Whether the times of a file begin below 0: there ffmpeg seeks to somewhere else, or not at all."""
-    return _is_early(_banner(Path(path)))
 
 
 def _is_early(told: str) -> bool:

@@ -856,7 +856,7 @@ def test_a_sound_track_keeps_its_name_and_role(tmp_path: Path):
     for again in ("a.mkv", "a.mp4"):  # of a Matroska's title ffmpeg makes the name by itself
         save(tmp_path / again, 3, 10, sound=clip, frames=3)
         clip = tmp_path / again
-        (track,) = sound_tracks(clip)
+        (track,), _ = sound_tracks(clip)
         assert track.roles == ("comment",)
     assert track.name == "The mix"
     assert probe(tmp_path / "a.mkv")[1]["tags"]["title"] == "The mix"

@@ -803,15 +803,21 @@ def test_saving_over_what_another_has_saved_asks_first(
     assert not robot.editor.session.project.is_overtaken
 
 
-def test_what_another_has_just_saved_is_told_before_it_is_replaced(robot: Robot, tmp_path: Path) -> None:
-    """Enter, in the first frame in which it is there: the person has not read that."""
+def asked_for_a_name(robot: Robot, folder: Path) -> SaveDialog:
+    """The dialog that a stroke is saved by, which proposes a name in a folder."""
     robot.drag((0.3, 0.4), (0.45, 0.4))
     robot.rest()
-    robot.editor.preferences.folder = str(tmp_path)
+    robot.editor.preferences.folder = str(folder)
     robot.key("ctrl+s")
     robot.frame(count=3)
     dialog = robot.editor.dialogs.shown[-1]
     assert isinstance(dialog, SaveDialog)
+    return dialog
+
+
+def test_what_another_has_just_saved_is_told_before_it_is_replaced(robot: Robot, tmp_path: Path) -> None:
+    """Enter, in the first frame in which it is there: the person has not read that."""
+    dialog = asked_for_a_name(robot, tmp_path)
     dialog.path.write_bytes(b"theirs")
     robot.key("enter")
     robot.frame(count=3)
@@ -824,13 +830,7 @@ def test_what_another_has_just_saved_is_told_before_it_is_replaced(robot: Robot,
 
 
 def test_saving_asks_for_a_name_and_where_the_picture_goes(robot: Robot, tmp_path: Path, widgets: Widgets) -> None:
-    robot.drag((0.3, 0.4), (0.45, 0.4))
-    robot.rest()
-    robot.editor.preferences.folder = str(tmp_path)
-    robot.key("ctrl+s")
-    robot.frame(count=3)
-    dialog = robot.editor.dialogs.shown[-1]
-    assert isinstance(dialog, SaveDialog)
+    dialog = asked_for_a_name(robot, tmp_path)
     # The name is marked: what is typed takes its place.
     robot.type("kept")
     robot.frame()
