@@ -67,6 +67,7 @@ def tell() -> None:
     from imgui_bundle import imgui
 
     from app.model.strokes import BrushPath
+    from app.model.tools import farthest
     from app.ui.editor import Editor
     from app.ui.events import Mods
     from app.ui.pointer import SPLIT_REACH
@@ -149,10 +150,12 @@ def tell() -> None:
             return
         after = self.document.recipe
         new = [one for one in (*after.stroke, *after.mask) if one not in before.stroke and one not in before.mask]
-        ways = [[(*sample[1:3], sample[0]) for sample in one.samples] for one in new if isinstance(one, BrushPath)]
+        new = [one for one in new if isinstance(one, BrushPath)]
         # Others are new because they were cut off at this moment.
-        made = [way for way in ways if any(dist(end[:2], begun) < 1e-4 for end in (way[0], way[-1]))]
-        say(made=made, heard=heard, dt=self.dt, extent=self.extent)
+        new = [one for one in new if any(dist(end[1:3], begun) < 1e-4 for end in (one.samples[0], one.samples[-1]))]
+        made = [[(*sample[1:3], sample[0]) for sample in one.samples] for one in new]
+        reach = [farthest(one, self.dt) for one in new]
+        say(made=made, reach=reach, heard=heard, dt=self.dt, extent=self.extent)
 
     for of, name, telling in (
         (Editor, "frame", frame_and_tell),
@@ -370,25 +373,27 @@ class Sitting:
             self.hand.one_key("alt", False)
         self.meet()
         presses = [one["rect"] for one in self.told if "press" in one]
-        made = [(one, told) for told in self.told if "made" in told for one in told["made"]]
+        made = [
+            (*one, told) for told in self.told if "made" in told for one in zip(told["made"], told["reach"], strict=True)
+        ]
         if len(presses) != len(sent) or len(made) != len(sent):
             raise Fault(
                 f"{len(sent)} strokes of {PAINTS[key]} sent, {len(presses)} begun, {len(made)} made; {self.now}"
             )
-        for (way, when), rect, (samples, told) in zip(sent, presses, made, strict=True):
+        for (way, when), rect, (samples, reach, told) in zip(sent, presses, made, strict=True):
             found = self.compare(way, rect, samples, PAINTS[key] == "curve")
             if PAINTS[key] != "curve":
-                self.compare_times(when, samples[0][2], [samples[at] for at in found], told)
+                self.compare_times(when, samples[0][2], [samples[at] for at in found], reach, told)
 
-    def compare_times(self, when: list[float], first: float, samples: list[list[float]], told: dict[str, Any]) -> None:
+    def compare_times(
+        self, when: list[float], first: float, samples: list[list[float]], reach: float, told: dict[str, Any]
+    ) -> None:
         """Each has the tick in which it was heard, or the one in which the brush, at its speed, could be there.
 
         Ticks in turn go no faster than the clock; on a machine that is too slow they may go slower.
         """
-        from app.model.tools import FASTEST
-
         heard, dt, at, arrives = told["heard"], told["dt"], 0, 0.0
-        (_, began, pen, *_), reach, before = heard[0], FASTEST * dt, samples[0]
+        (_, began, pen, *_), before = heard[0], samples[0]
         for sent, sample in zip(when, samples, strict=True):
             while at < len(heard) and max(abs(a - b) for a, b in zip(heard[at][3:], sample[:2], strict=True)) > 1.1e-5:
                 at += 1

@@ -196,10 +196,10 @@ def _follow(stroke: Stroke | MaskStroke, press: Press) -> Gesture:
     """The stroke follows the pointer; with Shift along the axis it set out on.
 
     A pointer that is faster than the fluid can be carried is followed along its path at that speed, also after it is
-    let go: on a slow machine, where there are few ticks to a movement, nothing is torn.
+    let go: on a slow machine, where there are few ticks to a movement, nothing is torn and nothing stays behind.
     """
     _, x0, y0, _ = stroke.samples[0]
-    path = _Path(press.extent, FASTEST * press.dt, (x0, y0))
+    path = _Path(press.extent, farthest(stroke, press.dt), (x0, y0))
     tick, pressure = stroke.samples[0][0], stroke.samples[0][3]
     axis: str | None = None
     while (touch := (yield stroke)) is not None:
@@ -221,6 +221,14 @@ def _follow(stroke: Stroke | MaskStroke, press: Press) -> Gesture:
         for place in path.follow():
             stroke = stroke.with_sample(tick, *place, pressure)
     return stroke
+
+
+def farthest(stroke: Stroke | MaskStroke, dt: float) -> float:
+    """How far the brush of a stroke follows the pointer in a tick of `dt` seconds, in longer sides.
+
+    A push no farther than its radius: that is as far as it carries anything in one step (solver/README.md, *Slipping*).
+    """
+    return min(FASTEST * dt, stroke.radius) if stroke.tool == "push" else FASTEST * dt
 
 
 class _Path:
@@ -265,7 +273,7 @@ def _line(press: Press, stroke: Stroke | MaskStroke, start: tuple[float, float])
     """A straight stroke from where the last one ended to where was clicked, at an even speed."""
     tick, x, y, pressure = stroke.samples[0]
     length = hypot((x - start[0]) * press.extent[0], (y - start[1]) * press.extent[1])
-    steps = max(2, round(length / LINE_SPEED / press.dt))
+    steps = max(2, round(length / LINE_SPEED / press.dt), ceil(length / farthest(stroke, press.dt)))
     stroke = stroke.model_copy(update={"samples": ((tick, *start, pressure),)})
     for k in range(1, steps + 1):
         part = k / steps

@@ -17,12 +17,18 @@ EXTENT = (1.0, 0.75)
 DT = 1 / 30
 
 
-def play(name: str, *touches: Touch, opposite: bool = False, last: tuple[float, float] | None = None) -> Stroke | None:
+def play(
+    name: str,
+    *touches: Touch,
+    opposite: bool = False,
+    last: tuple[float, float] | None = None,
+    radius: float = 0.1,
+) -> Stroke | None:
     """What a tool makes of touches and a release."""
     tool = TOOL[name]
     assert tool.gesture is not None
     gesture = tool.gesture(
-        Press(BrushSettings(0.1, 0.2, 0.8, hold=0.6, local=0.3), opposite, EXTENT, DT, last), touches[0]
+        Press(BrushSettings(radius, 0.2, 0.8, hold=0.6, local=0.3), opposite, EXTENT, DT, last), touches[0]
     )
     next(gesture)
     for touch in touches[1:]:
@@ -78,6 +84,20 @@ def test_a_pointer_that_is_too_fast_is_followed_at_the_fastest_speed() -> None:
     for before, after in zip(stroke.samples, stroke.samples[1:], strict=False):
         assert after[1] - before[1] <= 2.0 * DT + 1e-4
     assert stroke.last_tick == pytest.approx(0.8 / (2.0 * DT), abs=1.5)
+
+
+@pytest.mark.parametrize("last", [None, (0.1, 0.5)])
+def test_a_push_follows_no_faster_than_its_radius_a_tick(last: tuple[float, float] | None) -> None:
+    """No more is carried in one step, and what a quicker brush passes would stay behind: also along a straight line."""
+    way = (Touch(0, 0.1, 0.5), Touch(1, 0.311, 0.5)) if last is None else (Touch(0, 0.311, 0.5, 1.0, True),)
+    for name, farthest in (("push", 0.02), ("twirl", 2.0 * DT)):
+        stroke = play(name, *way, last=last, radius=0.02)
+        assert stroke is not None
+        steps = [after[1] - before[1] for before, after in pairwise(stroke.samples)]
+        assert stroke.samples[-1][1:3] == (0.311, 0.5)
+        assert max(steps) <= farthest + 1e-4
+        if last is None or name == "push":
+            assert stroke.last_tick - stroke.first_tick == pytest.approx(0.211 / farthest, abs=1)
 
 
 def test_a_fast_pointer_is_followed_along_its_path() -> None:
