@@ -24,7 +24,7 @@ SELECT_BY = {
     "subject": "Drag a rough box around it.",
 }
 """By what is selected, and how."""
-SMALLEST, LARGEST = 0.005, 0.5  # of a brush's radius, in longer sides
+SMALLEST, LARGEST = 0.001, 0.5  # of a brush's radius, in longer sides: an eyelash of a photograph is a few pixels wide
 LIMITS = {
     "radius": (SMALLEST, LARGEST), "hardness": (0.0, 1.0), "strength": (0.05, 1.0), "hold": (0.0, 1.0),
     "local": (0.0, 1.0), "stiffness": (0.01, 1.0),

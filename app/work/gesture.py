@@ -23,6 +23,7 @@ class OpenGesture:
 
     Attributes:
         made: the stroke, or the handle; None as long as there is none.
+        brush: as it was set when the gesture began, which it keeps.
         path: where it has been, as fractions of the picture.
         pen: the tick that it is recorded at: ahead of the simulation while strokes before it are still waiting. While a
             mask is painted in no time, it counts the hand's.
@@ -37,6 +38,7 @@ class OpenGesture:
         self.made: Made | None = None
         self.path = [touch[1:3]]
         self.pen = touch.tick
+        self.brush = press.brush
         self._tool = tool
         self._first = self._touch = touch
         self._string = PulledString(press.string, extent, self.path[0])

@@ -21,7 +21,7 @@ from app.model.recipe import Recipe
 from app.model.sampling import Point
 from app.model.strokes import Stroke
 from app.model.timeline import NEARLY, Timeline, moment_at
-from app.model.tools import Made
+from app.model.tools import BrushSettings, Made
 from app.work.gesture import OpenGesture
 from app.work.replay import Replay
 from solver.gl.device import Device
@@ -163,6 +163,11 @@ class Recording:
     def path(self) -> list[Point]:
         """Where the gesture that is under way has been, as fractions of the picture."""
         return self._gesture.path if self._gesture else []
+
+    @property
+    def brush(self) -> BrushSettings | None:
+        """That of the gesture under way, which it keeps whatever is set meanwhile."""
+        return self._gesture and self._gesture.brush
 
     @property
     def made(self) -> Made | None:

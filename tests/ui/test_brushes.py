@@ -11,8 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from app.gallery import retouching
 from app.model.presets import BRUSHES
-from app.ui.editor_state import EditorState, presets
+from app.ui.editor_state import LIMITS, EditorState, presets
 from app.ui.preferences import Preferences
 from solver.gl.device import Device
 from support.editing import Robot, small_project
@@ -94,6 +95,30 @@ def test_brushes_are_kept_by_name_chosen_and_deleted(robot: Robot, widgets: Widg
     assert state.brush.radius == 0.07
     robot.click(keep.right - 14, field - row)
     assert likes.presets == Preferences.load().presets == {}
+
+
+@pytest.mark.parametrize("name", retouching.JOBS)
+def test_a_brush_can_be_as_small_as_those_of_the_guide(name: str) -> None:
+    least, most = LIMITS["radius"]
+    for stroke in retouching.load(name).stroke:
+        assert least <= stroke.radius <= most
+
+
+def test_the_ring_of_a_stroke_under_way_is_as_large_as_its_brush(robot: Robot) -> None:
+    robot.see()
+    x, y = robot.at(0.5, 0.5)
+    robot.move(x, y)
+    robot.press()
+    robot.frame(count=4)
+    before, radius = robot.canvas(), robot.editor.state.brush.radius
+    robot.key("]")
+    robot.frame(count=4)
+    assert robot.editor.state.brush.radius > radius
+    assert np.array_equal(robot.canvas(), before), "the larger one is the next stroke's"
+    robot.move(x + 30, y)
+    robot.release()
+    robot.rest()
+    assert robot.editor.session.recipe.stroke[-1].radius == radius
 
 
 def test_the_stabiliser_is_as_long_on_the_screen_at_any_zoom(robot: Robot) -> None:

@@ -51,7 +51,7 @@ def draw(
         _handles(ui, view, session, state, pointer, lines)
     _dashes(ui, [view.to_screen(*place) for place in selecting], lines)
     if pointer.shows_ring:
-        _ring(ui, view, state, pointer, lines)
+        _ring(ui, view, session, state, pointer, lines)
     lines.pop_clip_rect()
 
 
@@ -90,13 +90,16 @@ def _axes(ui: Ui, view: Viewport, state: EditorState, lines: imgui.ImDrawList) -
         lines.add_line(ImVec2(x, y), end, packed(WHITE, 0.8), ui.px(1.0))
 
 
-def _ring(ui: Ui, view: Viewport, state: EditorState, pointer: PointerController, lines: imgui.ImDrawList) -> None:
+def _ring(
+    ui: Ui, view: Viewport, session: Session, state: EditorState, pointer: PointerController, lines: imgui.ImDrawList
+) -> None:
     """A faint ring as far as the brush reaches, a bright one where it is half as strong: one ring when it is hard.
 
-    What is frozen is so as far as the brush reaches, however hard it is. Where the symmetry lets it act too, the second
-    is faint.
+    Of a stroke under way it shows the brush that acts: one that is resized meanwhile is the next stroke's. What is
+    frozen is so as far as the brush reaches, however hard it is. Where the symmetry lets it act too, the second is
+    faint.
     """
-    brush, (x, y) = state.brush, pointer.ring_at
+    brush, (x, y) = session.brush or state.brush, pointer.ring_at
     reach = brush.radius * view.longer
     core = 1.0 if state.tool_name == "freeze" else 0.9 * brush.hardness
     # Where the brush is half as strong as in its middle: (1 - q^2)^3 = 1/2, between the core and the reach.
