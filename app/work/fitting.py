@@ -377,7 +377,10 @@ def _aimed(device: Device, recipe: Recipe, pictures: Pictures, pairs: Pairs | No
         )
     base = recipe.edited(handle=tuple(kept))
     if not timed:
-        base = base.edited(duration=min(max(base.duration, DURATION[0]), DURATION[1]))
+        # [time] may show a part of it alone, which would lie behind its end.
+        shows_part = base.time.start or base.time.end or base.time.dissolve
+        most = inf if shows_part else DURATION[1]
+        base = base.edited(duration=min(max(base.duration, DURATION[0]), most))
     return _Aim(base, Pairs.points(np.array(places)), tuple(names), tuple(leads), np.array(begins), tuple(own))
 
 
