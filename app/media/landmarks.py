@@ -167,7 +167,8 @@ def _read_csv(path: Path, lines: Lines, spacing: float) -> tuple[np.ndarray, tup
     """Pairs (n, 2, 2) in pixels and the curve of each, whose points are so many pixels apart at most."""
     columns, groups = list(COLUMNS), dict[tuple[str, int], tuple[list[list[float]], list[list[float]]]]()
     for first, (number, line) in enumerate(lines):
-        words = _words(line, (len(columns),) if first else (len(COLUMNS), len(COLUMNS) + 1))
+        curve_at = columns.index(CURVE) if CURVE in columns else None
+        words = _words(line, (len(columns),) if first else (len(COLUMNS), len(COLUMNS) + 1), curve_at)
         if first == 0 and not any(map(_is_number, words)):
             columns = [word.lower() for word in words]
             if sorted(columns) not in (sorted(COLUMNS), sorted((CURVE, *COLUMNS))):
@@ -194,10 +195,10 @@ def _read_csv(path: Path, lines: Lines, spacing: float) -> tuple[np.ndarray, tup
     return np.concatenate(pairs), tuple(curves)
 
 
-def _words(line: str, counts: tuple[int, ...]) -> list[str]:
+def _words(line: str, counts: tuple[int, ...], curve_at: int | None) -> list[str]:
     """What is between the tabs, semicolons or commas of a line, whichever give one of these counts.
 
-    Between the former two a number may have a decimal comma.
+    Between the former two a number may have a decimal comma; the word `curve_at` is a curve's name, and none.
     """
     words = list[str]()
     for separator in filter(line.__contains__, "\t;,"):
@@ -207,7 +208,8 @@ def _words(line: str, counts: tuple[int, ...]) -> list[str]:
             continue
         if len(words) in counts:
             pointed = words if separator == "," else [word.replace(",", ".", 1) for word in words]
-            return [point if _is_number(point) else word for word, point in zip(words, pointed, strict=True)]
+            both = enumerate(zip(words, pointed, strict=True))
+            return [point if at != curve_at and _is_number(point) else word for at, (word, point) in both]
     return words
 
 

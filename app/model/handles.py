@@ -263,6 +263,11 @@ def labelled(handles: Sequence[RecipeHandle], pins: Sequence[RecipePin]) -> list
     ]
 
 
+def in_pixels(far: float) -> str:
+    """So many pixels as messages say it: with three digits, and in a large picture with more, but no power of ten."""
+    return f"{far:.3g}" if far < 999.5 else f"{far:.0f}"
+
+
 def in_words(said: str) -> str:
     """What messages say, in the window: handle 1 "smile" for handle[1] "smile", pixels alone, Size for radius."""
     said = re.sub(r"\b(handle|pin)\[(\d+)\]", r"\1 \2", re.sub(r" \([\d.e-]+ longer sides\)", "", said))

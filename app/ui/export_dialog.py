@@ -29,7 +29,7 @@ from app.media.pictures import read_picture
 from app.media.project import check_pictures_kept
 from app.model.handles import heading
 from app.model.recipe import Recipe
-from app.model.timeline import NEARLY, Timeline, steps_of
+from app.model.timeline import NEARLY, Sentinel, Timeline, steps_of
 from app.ui.canvas import shown_pixels
 from app.ui.chooser import FileChooser
 from app.ui.clipboard import Giving, check
@@ -346,6 +346,8 @@ class ExportDialog(Dialog):
                 pace = f"{float(self._rate):.5g} frames a second" if clip.durations is None else "own pace"
                 about = f"The clip warped, at its {pace}{', with its ' * bool(kept)}{' and '.join(kept)}."
                 ui.wrapped(about, ui.palette.dim, 13)
+        if not Sentinel(self.session.recipe.stop, self.session.dt).is_idle:
+            ui.wrapped("Ends where the recipe's [stop] is met, if that is earlier.", ui.palette.dim, 13)
         ui.dim("Simulate on the grid")
         choices.finer = ui.segmented("finer", [label for label, _ in FINER], choices.finer, -1)
         if choices.finer and choices.kind != MAP:
@@ -560,7 +562,10 @@ class Exports:
             if process.error:
                 self._copied = None
                 self.messages.warn(process.error)
-            elif self._copied is not None:
+                return
+            if verdict := process.outcome.verdict:  # the window plays on where a recipe's [stop] ends an export
+                self.messages.say(f"{heading(verdict)}. The recipe's [stop] ended it there.")
+            if self._copied is not None:
                 self._giving = Giving(process.job.target)
             else:
                 for notice in process.notices:

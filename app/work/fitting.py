@@ -26,6 +26,7 @@ from app.model.handles import (
     MOST_SCALE,
     MOST_TURNED,
     RecipeHandle,
+    in_pixels,
     labelled,
     objections,
 )
@@ -127,7 +128,7 @@ class Fitted:
             shape = f"{trial.folds} place{' folds' if trial.folds == 1 else 's fold'}"
         else:
             shape = f"nothing folds, and the picture grows to {1 / trial.det:.3g} times its area at most"
-        met = f"mean error {errors.mean():.3g} pixels, most {errors.max():.3g}"
+        met = f"mean error {in_pixels(errors.mean())} pixels, most {in_pixels(errors.max())}"
         return f"{len(errors)} {self.noun}{several}, {met}; {shape}"
 
 
@@ -377,7 +378,10 @@ def _aimed(device: Device, recipe: Recipe, pictures: Pictures, pairs: Pairs | No
         )
     base = recipe.edited(handle=tuple(kept))
     if not timed:
-        base = base.edited(duration=min(max(base.duration, DURATION[0]), DURATION[1]))
+        # [time] may show a part of it alone, which would lie behind its end.
+        shows_part = base.time.start or base.time.end or base.time.dissolve
+        most = inf if shows_part else DURATION[1]
+        base = base.edited(duration=min(max(base.duration, DURATION[0]), most))
     return _Aim(base, Pairs.points(np.array(places)), tuple(names), tuple(leads), np.array(begins), tuple(own))
 
 
@@ -657,7 +661,7 @@ class _Search:
 
         def away(numbers: Sequence[int]) -> tuple[str, str]:
             most = max((errors[number] for number in numbers), default=0.0)
-            off = f"{most:.3g} pixels from where"
+            off = f"{in_pixels(most)} pixels from where"
             return f"ends {off} it should be", f"end up to {off} they should be"
 
         for numbers, one, more in self._caught:

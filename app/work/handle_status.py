@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from app.model.handles import ARRIVED, RecipeHandle, RecipePin, leads_too_far
+from app.model.handles import ARRIVED, RecipeHandle, RecipePin, in_pixels, leads_too_far
 from app.model.sampling import Point
 from app.model.windows import LEAST_PER_RADIUS
 from app.work.replay import Replay
@@ -160,7 +160,7 @@ def unmet(replay: Replay, within: float, is_fitted: bool = False) -> Iterator[Un
             elif helped and halt in ("strain", "alone") and not is_wide:
                 why, helped = SMALL.format(cells), False
             pixels = far * max(replay.pictures.source.width, replay.pictures.source.height)
-            said = f"{label} is {pixels:.3g} pixels ({far:.3g} longer sides) from where it should be: {why}"
+            said = f"{label} is {in_pixels(pixels)} pixels ({far:.3g} longer sides) from where it should be: {why}"
             yield Unmet(label, said, helped)
 
 

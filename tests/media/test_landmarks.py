@@ -125,6 +125,15 @@ def test_a_name_that_would_part_its_line_comes_back(tmp_path: Path) -> None:
     assert list(dict.fromkeys(read_pairs([tmp_path / "out.csv"], SIZE).curves)) == list(names)
 
 
+@pytest.mark.parametrize("separator", [";", "\t"])
+def test_a_curve_s_name_is_no_number_with_a_decimal_comma(separator: str, tmp_path: Path) -> None:
+    rows = "curve;x0;y0;x1;y1\n1,5;10,5;20;30;40\n1,5;12;22;32;42\n"
+    (tmp_path / "a.csv").write_text(rows.replace(";", separator))
+    found = read_pairs([tmp_path / "a.csv"], SIZE)
+    assert set(found.curves) == {"1,5"}
+    assert found.places[0, 0, 0] * SIZE[0] == pytest.approx(10.5)
+
+
 def test_a_closed_curve_has_its_first_place_once(tmp_path: Path) -> None:
     square, far = [(20, 20), (60, 20), (60, 60), (20, 60), (20, 20)], 30
     rows = "".join(f"box,{x},{y},{x + far},{y}\n" for x, y in square)

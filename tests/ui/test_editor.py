@@ -27,7 +27,7 @@ from app.media.project import Project
 from app.model.forces import VortexForce
 from app.model.mask_edits import MaskStroke
 from app.model.picture import Picture
-from app.model.recipe import Recipe
+from app.model.recipe import Recipe, Stop
 from app.model.tools import TOOLS
 from app.progress import Progress
 from app.ui import workspace
@@ -1807,6 +1807,22 @@ def test_what_the_exported_file_does_not_hold_is_told(robot: Robot, tmp_path: Pa
         f"{dialog.output.name} cuts values above 1; write .exr to keep it",
         f"Exported {dialog.output.name} to {tmp_path}",
     ]
+
+
+def test_where_a_recipe_s_stop_ends_an_export_is_told(robot: Robot, tmp_path: Path) -> None:
+    """The window plays on, and shows another picture than is written."""
+    push = VortexForce(kind="vortex", point=(0.5, 0.5), radius=0.2, strength=1.0, at=0.0)
+    robot.editor.session.edit("A", force=(push,), duration=0.5, stop=Stop(displacement_above=0.001))
+    robot.editor.session.seek(robot.editor.session.end)
+    robot.rest()
+    dialog = export_dialog(robot, tmp_path)
+    robot.editor.exports.start(dialog.job())
+    robot.until(lambda: not robot.editor.exports.is_running)
+    stopped, exported = (message.text for message in robot.editor.messages.shown)
+    assert re.fullmatch(
+        r"Stopped at t = .* s \(tick \d+\): largest displacement .*\. The recipe's \[stop\] ended it there\.", stopped
+    )
+    assert exported.startswith("Exported ")
 
 
 def test_what_an_export_tells_is_shown(robot: Robot, tmp_path: Path) -> None:

@@ -249,6 +249,15 @@ def test_without_pairs_the_recipe_s_own_handles_are_fitted_and_all_keep_their_nu
         fit(device, None)
 
 
+def test_what_an_animation_shows_of_a_long_recipe_is_still_there_once_it_is_fitted(device: Device):
+    """Two seconds are enough for handles, and its [time] began behind them."""
+    led = "[[handle]]\nat = [0.3, 0.4]\nto = [0.36, 0.43]\n"
+    long = FREE.replace("duration = 0.8", "duration = 2.4")
+    assert fit(device, None, 1, f"{long}{led}").trial.recipe.duration == 2.0
+    for shown in ("start = 2.2", "end = 2.3", "dissolve = 1.1"):
+        assert fit(device, None, 1, f"{long}[time]\n{shown}\n{led}").trial.recipe.duration == 2.4
+
+
 def test_what_is_turned_is_turned_at_the_end_as_it_was_and_a_line_that_stays_is_held_whole(device: Device):
     still = "[[handle]]\nat = [0.2, 0.3]\nrotate = 40.0\nturned = [[1.1, 20.0, 1.5]]\n"
     led = "[[handle]]\nat = [0.4, 0.6]\nto = [0.46, 0.6]\nduration = 0.1\nrotate = 90.0\nturned = [[0.2, 30.0, 1.2]]\n"

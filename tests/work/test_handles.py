@@ -9,7 +9,7 @@ import pytest
 
 from app.errors import UserError
 from app.media.auxiliary import Pictures
-from app.model.handles import ARRIVED, MOST_OBJECTIONS, RecipeHandle, objections
+from app.model.handles import ARRIVED, MOST_OBJECTIONS, RecipeHandle, in_pixels, objections
 from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.model.schema import frozen
@@ -882,6 +882,12 @@ def test_what_is_not_reached_is_told_by_number(device: Device):
     assert said.endswith("from where it should be: what it holds is frozen")
     assert replay.warp.statistics().folds == 0
     replay.release()
+
+
+def test_how_far_is_told_without_a_power_of_ten_in_a_large_picture():
+    assert [in_pixels(far) for far in (0.7184, 43.44, 999.4, 999.6, 1234.5, 8410.4)] == [
+        "0.718", "43.4", "999", "1000", "1234", "8410",
+    ]  # fmt: skip
 
 
 def test_a_line_that_is_led_about_a_place_far_outside_is_told_of(device: Device):
