@@ -16,6 +16,7 @@ from operator import itemgetter
 from typing import Annotated, Any, Literal, Protocol, Self
 
 from pydantic import Field, field_validator, model_validator
+from pydantic_core import PydanticCustomError
 
 from app.errors import UserError
 from app.model.schema import Model, Several
@@ -198,7 +199,11 @@ class Timed(Model):
     @field_validator("at", mode="before")
     @classmethod
     def _listed(cls, at: Any) -> Any:
-        return (at,) if isinstance(at, (int, float)) and not isinstance(at, bool) else at
+        if isinstance(at, (int, float)) and not isinstance(at, bool):
+            return (at,)
+        if at is not None and not isinstance(at, (tuple, list)):
+            raise PydanticCustomError("numbers_type", "a number or a list of numbers")
+        return at
 
     @model_validator(mode="after")
     def _one_law(self) -> Self:

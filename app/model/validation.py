@@ -24,6 +24,7 @@ _WANTED = {
     "string_type": "a text in quotes",
     "bool_type": "true or false",
     "tuple_type": "a list",
+    "numbers_type": "a number or a list of numbers",
     "list_type": "a list",
     "dict_type": "a table",
     "model_type": "a table",
@@ -81,7 +82,8 @@ def named(path: list[int | str], data: Any) -> tuple[str, str]:
     for item in path:
         data = _item(data, item)
         if isinstance(item, int) and isinstance(data, dict):
-            table, key = f"{table}{label_of(key, item + 1, data.get('name', ''))}: ", ""
+            name = data.get("name")
+            table, key = f"{table}{label_of(key, item + 1, name if isinstance(name, str) else '')}: ", ""
         else:
             key += f"[{item + 1}]" if isinstance(item, int) else f".{item}" if key else item
     return table, key
@@ -107,12 +109,16 @@ def _sentence(fault: Any, path: list[int | str], data: Any, model: type[BaseMode
     if kind in ("union_tag_not_found", "union_tag_invalid"):
         tag = str(context["discriminator"]).strip("'")
         choices = ", ".join(repr(tag) for tag in _tags(model, fault["loc"]))
-        return f"{table}{tag!r} must be one of {choices}" + (f", not {context['tag']!r}" if "tag" in context else "")
+        but = f", not {_shown(given[tag])}" if "tag" in context else ""
+        return f"{table}{tag!r} must be one of {choices}{but}"
     if kind == "value_error":
         return f"{table}{key}{': ' if key else ''}{context['error']}"
     wanted = _WANTED.get(kind)
     if wanted is None:
         return f"{table}{key}: {fault['msg']}"
+    if path and not key:  # a table of a list, where something else had to be
+        table, key = named(path[:-1], data)
+        key += f"[{int(path[-1]) + 1}]"
     bounds = {name: f"{bound:g}" if isinstance(bound, float) else bound for name, bound in context.items()}
     but = f", not {_shown(given)}" if kind != "too_short" or given else ", and is empty"
     if kind == "tuple_type" and isinstance(given, dict) and not table:

@@ -779,10 +779,10 @@ def _strain(replay: Replay) -> float:
     return float(np.sqrt(part * sum((slope**2).sum(axis=-1).mean() for slope in slopes)))
 
 
-def _is_fitted(handle: RecipeHandle) -> int:
-    """The number of the pair that a handle was made for by a fit, from 1; 0 if it was not."""
+def _is_fitted(handle: RecipeHandle) -> bool:
+    """True if a fit has made it for a pair."""
     word, _, number = handle.name.partition(" ")
-    return int(number) if word == NAME and number.isdecimal() else 0
+    return word == NAME and number.isdecimal()
 
 
 def _rounded(value: float) -> float:

@@ -144,5 +144,7 @@ class ScaledMap:
             for name, part in (("scaled", amount), ("unscaled", 1.0)):
                 targets = fields.get(name, target.size, 2), fields.get(f"{name}, too", target.size, 2)
                 bent[name] = warp.factors.draw(targets, part, warp.submap, origin, step, before, regions, warp.edges)
+        if bent:
+            bent |= {"picture": warp.factors.picture, "origin": origin, "step": step}
         scale = self.device.pass_("warp/scale.frag", **({"BENT": 1} if bent else {}))
         scale(target, region=regions, displacement=whole, amount=amount, **bent)

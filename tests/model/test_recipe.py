@@ -150,13 +150,16 @@ def test_save_and_load(tmp_path: Path):
         ("version = 1.0", "'version' must be 5, not 1.0"),
         (
             "[[force]]\nkind = 'vortex'\npoint = [0.1, 0.1]\nat = true",
-            "line 4: force[1]: 'at' must be a list, not true",
+            "line 4: force[1]: 'at' must be a number or a list of numbers, not true",
         ),
         ("[[force]]\nkind = 'vortex'\npoint = [0.1, 0.1]\nat = [1, true]", "'at[2]' must be a number, not true"),
         ("[[handle]]\nto = [0.1, 0.1]\npoints = 3", "line 3: handle[1]: 'points' must be a list, not 3"),
         ("[[handle]]\nto = [0.1, 0.1]\npoints = [[0.1, 0.1], 'x']", "'points[2]' must be a list, not \"x\""),
         ("[[handle]]\nto = [0.1, 0.1]\npoints = [[0.1, 0.1], [0.2]]", "'points[2][2]' is missing"),
         ("[[handle]]\nat = [0.1, 0.1]\ngoals = [[0.1, true], [0.2, 0.2]]", "'goals[1][2]' must be a number, not true"),
+        ("[[handle]]\nat = [{}, 0.1]\nto = [0.1, 0.1]", "handle[1]: 'at[1]' must be a number, not a table"),
+        ("[[handle]]\nname = 'a'\nat = [0.1, 0.1]\nkeys = [[0, 1, {}]]", "handle[1] \"a\": 'keys[1][3]' must be a number"),
+        ("[[pin]]\nname = [3]\nat = [0.1, 0.1]", "line 2: pin[1]: 'name' must be a text in quotes, not a list of 1"),
         ("[[pin]]\npoints = true", "line 2: pin[1]: 'points' must be a list, not true"),
         ("duration = 2020-01-01", "'duration' must be a number, not 2020-01-01"),
         ("version = 6", "of version 6, and this fluidwarp reads recipes up to version 5"),
@@ -169,7 +172,8 @@ def test_save_and_load(tmp_path: Path):
         ("[[stop.watch]]\npoint = [0.1, 0.1]", "stop.watch[1]: give either 'distance' or 'place'"),
         ("[[stroke]]\ntool = 'push'\nsamples = []", "line 3: stroke[1]: 'samples' must be a list of at least 1"),
         ("[[stroke]]\ntool = 'pish'\nsamples = [[0, 0, 0, 1]]", "'tool' must be one of 'push'"),
-        ("[[force]]\nkind = 'whirl'", ", not 'whirl'"),
+        ("[[force]]\nkind = 'whirl'", ', not "whirl"'),
+        (f"[[force]]\nkind = '{'a' * 999}'", f', not "{"a" * 36}...'),
         ("[[stroke]]\ntool = 'push'\nradius = 0\nsamples = [[0, 0, 0, 1]]", "'radius' must be at least 1e-06, not 0"),
         (
             "[[stroke]]\ntool = 'push'\nradius = 1e-7\nsamples = [[0, 0, 0, 1]]",
@@ -283,7 +287,7 @@ def test_what_must_not_go_beyond_another_may_be_the_same(text: str):
 )
 def test_of_a_kind_that_there_is_not_all_are_told_that_there_are(table: str, kinds: tuple[str, ...]):
     all_of_them = f"a.toml, line 1: {table}[1]: 'kind' must be one of {', '.join(map(repr, kinds))}"
-    for text, more in (("kind = 'whirl'", ", not 'whirl'"), ("", "")):
+    for text, more in (("kind = 'whirl'", ', not "whirl"'), ("", "")):
         with pytest.raises(UserError) as caught:
             Recipe.parse(f"[[{table}]]\n{text}", "a.toml")
         assert str(caught.value) == all_of_them + more

@@ -115,8 +115,12 @@ def test_a_part_of_a_map_takes_its_factors_scaled_and_not_whole(device: Device) 
     found = drawn(device, "warp/scale.frag", 2, displacement=whole, amount=0.3)
     np.testing.assert_allclose(found, 0.3 * whole, atol=1e-6)
     given = {"displacement": whole, "scaled": scaled, "unscaled": unscaled}
-    found = drawn(device, "warp/scale.frag", 2, BENT=1, amount=0.3, **given)
-    np.testing.assert_allclose(found, 0.3 * whole + scaled - 0.3 * unscaled, atol=1e-6)
+    place = {"picture": (2.0, 1.5), "origin": (0.0, 0.0), "step": (1 / 20, 1 / 12)}
+    found = drawn(device, "warp/scale.frag", 2, BENT=1, amount=0.3, **given, **place)
+    x = (np.stack(np.meshgrid(np.arange(20), np.arange(12)), axis=-1) + 0.5) * (2 / 20, 1.5 / 12)
+    led = x + 0.3 * whole + scaled - 0.3 * unscaled
+    assert ((led < 0) | (led > (2.0, 1.5))).any(), "some would leave the picture"
+    np.testing.assert_allclose(x + found, np.clip(led, 0, (2.0, 1.5)), atol=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -211,6 +211,25 @@ def test_of_a_folded_warp_nothing_folds_at_no_amount(device: Device) -> None:
     replay.release()
 
 
+def test_no_part_of_what_folds_leads_out_of_the_picture(device: Device) -> None:
+    """A local force leads a narrow picture out of itself in one tick, farther than its factors tell."""
+    force = {"kind": "curve", "points": [[0.42078, 0.94832], [0.45332, 0.3035], [1.04109, 0.54226]]}
+    force |= {"radius": 0.188, "falloff": "gaussian", "local": 1.0, "strength": 1.235}
+    fluid = {"grid": 48, "viscosity": 0.3, "drag": 30.0, "walls": "no-slip"}
+    told = {"force": [force], "duration": 0.08, "fluid": fluid}
+    recipe = Recipe.model_validate(frozen({"version": 5, **told}))
+    replay = Replay(device, recipe, Pictures(Picture(np.zeros((8, 300, 3), np.uint8))), budget=0)
+    replay.seek(recipe.ticks)
+    scaled = ScaledMap(replay.warp)
+    places = (np.stack(np.meshgrid(np.arange(300), np.arange(8)), axis=-1) + 0.5) / 300
+    for scaled.amount in (0.3, 0.55, 0.8, 1.3):
+        led = places + scaled.read((300, 8))
+        assert -1e-6 < led.min(), scaled.amount
+        assert (led < np.array(scaled.extent) + 1e-6).all(), scaled.amount
+    scaled.release()
+    replay.release()
+
+
 def test_a_part_that_folds_beside_what_is_frozen_is_told(device: Device, fluidwarp: Run, tmp_path: Path) -> None:
     """A half turn far from a frozen corner: where anything is frozen all is scaled in one, and half of it folds."""
     corner = Stroke(tool="freeze", radius=0.03, hardness=1.0, samples=((0, 0.04, 0.06, 1.0), (1, 0.04, 0.06, 1.0)))
