@@ -140,6 +140,7 @@ class Editor:
     def open(self, project: Project, pixels: np.ndarray | None = None, found: Found | None = None) -> None:
         """Work on another project; see `Workspace.open`."""
         self.workspace.open(project, pixels, found)
+        self.state.suit(self.session.recipe.fluid_at(self.session.target))
         self.quality.opened(found)
         self.clock.stir()
 

@@ -8,7 +8,8 @@ import numpy as np
 
 from app.model.areas import Part
 from app.model.mask_edits import MaskName
-from app.model.presets import BRUSHES, BrushPreset
+from app.model.presets import BRUSHES, FEELS, BrushPreset
+from app.model.recipe import FluidSettings
 from app.model.strokes import Symmetry
 from app.model.tools import TOOL, BrushSettings, Tool
 from app.ui.lanes import Lanes
@@ -163,6 +164,12 @@ class EditorState:
         for name, tool in TOOL.items():
             if "local" in tool.settings:
                 self.brushes[name] = replace(self.brushes.get(name, BrushSettings()), local=local)
+
+    def suit(self, fluid: FluidSettings) -> None:
+        """Let pushes be as local as is best for the fluid of a work that is opened, unless a person has set a part."""
+        best = [feel.local for feel in FEELS if feel.fits(fluid)]
+        if best and {brush.local for brush in self.brushes.values()} <= {feel.local for feel in FEELS}:
+            self.make_local(best[0])
 
     @property
     def is_opposite(self) -> bool:

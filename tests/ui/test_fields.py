@@ -17,7 +17,9 @@ from app.media.animation import ANIMATIONS as CONTAINERS
 from app.media.formats import FORMATS
 from app.media.maps import MAP_ENDINGS
 from app.media.pictures import write_picture
+from app.media.project import from_picture
 from app.model.picture import Picture
+from app.model.presets import PUTTY
 from app.model.recipe import Output
 from app.model.strokes import BrushPath, Change
 from app.progress import Progress
@@ -32,7 +34,7 @@ from app.work.export import run
 from app.work.jobs import Job
 from solver.gl.device import Device
 from support.commands import Run
-from support.editing import Robot, export_dialog
+from support.editing import Robot, export_dialog, small_project
 from support.widgets import Widgets
 
 
@@ -170,6 +172,18 @@ def test_a_feel_is_its_viscosity_drag_and_how_local_a_push_is(
     widgets.click(words)
     fluid = robot.editor.session.recipe.fluid
     assert (fluid.viscosity, fluid.drag, robot.editor.state.brush.local) == (viscosity, drag, local)
+
+
+def test_a_work_that_is_opened_makes_pushes_as_local_as_its_fluid_wants(robot: Robot, tmp_path: Path) -> None:
+    state, honey = robot.editor.state, small_project(tmp_path)
+    fluid = honey.recipe.fluid.model_copy(update={"viscosity": PUTTY.viscosity, "drag": PUTTY.drag})
+    putty = from_picture(tmp_path / "pattern.png", honey.recipe.edited(fluid=fluid))
+    for project, local in ((putty, 1.0), (honey, 0.0)):
+        robot.editor.open(project)
+        assert state.brush.local == local
+    state.brush = replace(state.brush, local=0.4)
+    robot.editor.open(putty)
+    assert state.brush.local == 0.4, "set by hand"
 
 
 def test_every_kind_of_edge_of_the_picture_is_what_it_is_called(robot: Robot, widgets: Widgets) -> None:
@@ -732,10 +746,10 @@ opacity velocity, Opacity: 0% to 100%, 70%
 opacity forces, Opacity: 0% to 100%, 70%
 mask reach, By: 0 px to 60 px by ratios, 5 px
 amount, Amount: 0% to 150%, 100%
-radius, Size: 2 px to 240 px by ratios, 72 px
+radius, Size: 0 px to 240 px by ratios, 72 px
 stiffness, Stiffness: 1% to 100%, 100%
 local, Local: 0% to 100%, 0%
-held radius, Size: 2 px to 480 px by ratios, 72 px
+held radius, Size: 0 px to 480 px by ratios, 72 px
 held stiffness, Stiffness: 1% to 100%, 100%
 held local, Local: 0% to 100%, 0%
 held rotate, Rotate: -180° to 180°, 0°
