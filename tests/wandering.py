@@ -373,9 +373,8 @@ class Sitting:
             self.hand.one_key("alt", False)
         self.meet()
         presses = [one["rect"] for one in self.told if "press" in one]
-        made = [
-            (*one, told) for told in self.told if "made" in told for one in zip(told["made"], told["reach"], strict=True)
-        ]
+        releases = [told for told in self.told if "made" in told]
+        made = [(*one, told) for told in releases for one in zip(told["made"], told["reach"], strict=True)]
         if len(presses) != len(sent) or len(made) != len(sent):
             raise Fault(
                 f"{len(sent)} strokes of {PAINTS[key]} sent, {len(presses)} begun, {len(made)} made; {self.now}"
