@@ -85,7 +85,7 @@ def test_the_same_is_found_again_also_from_what_was_fitted(device: Device):
     ("pairs", "more", "said"),
     [
         ([[[1.2, 0.5], [0.5, 0.5]], [[0.3, 0.3], [0.4, 0.3]]], "", "pair 1 is left out: its point is outside"),
-        ([[[4e3, 0.5], [0.5, 0.5]], [[0.3, 0.3], [0.4, 0.3]]], "", "pair 1 is left out: its point is outside"),
+        ([[[4e3, 0.5], [0.5, 0.5]], [[0.3, 0.3], [0.4, 0.3]]], "", "pair 1 is left out: its point is outside the picture"),
         ([[[0.3, 0.3], [0.4, 0.3]], [[0.7, 0.5], [1.2, 0.5]]], "", "pair 2 goes only to the picture's edge"),
         (
             [[[0.4, 0.5], [0.5, 0.5]], [[0.4, 0.5], [0.3, 0.5]]],
