@@ -343,7 +343,8 @@ def _aimed(device: Device, recipe: Recipe, pictures: Pictures, pairs: Pairs | No
         names = tuple(f"{NAME} {number}" for number in range(1, len(pairs.places) + 1))
         pairs, leads = Pairs(np.round(pairs.places, DECIMALS), pairs.curves), list[_Lead]()
         for name, (at, to) in zip(names, pairs.places.tolist(), strict=True):
-            handle = one.model_copy(update={"name": name, "at": tuple(at), "to": tuple(to)})
+            x, y = np.clip(at, -10.0, 10.0).tolist()  # as far as a recipe goes: what is outside is left out
+            handle = one.model_copy(update={"name": name, "at": (x, y), "to": tuple(to)})
             (shape,) = _shapes([handle], extent)
             leads.append(_Lead.of(handle, shape, shape.led, shape.led, inf))
         return _Aim(base, pairs, names, tuple(leads), pairs.places[:, 0])

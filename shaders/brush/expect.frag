@@ -1,5 +1,6 @@
 // Expect: what det J would be if the map lost nothing, as a logarithm: E'(x) = E(x_d) - dt div V halfway. The fluid keeps
-// areas, but for sources and what is local. Outside its window nothing changes.
+// areas, but for sources and what is local. Outside its window nothing changes. E stays within what det J can be in 32 bits:
+// what a source has fed for minutes would be divided by zero.
 // u_expected (E): over the whole picture; u_velocity (V): what carries the picture, MAC faces, lengths / s; u_cells_a_speed:
 // dt / spacing; u_corner, u_scale: where the window begins in texels of E, and cells for each of them.
 // reads: 79
@@ -12,6 +13,8 @@ uniform vec2 u_corner;
 uniform vec2 u_scale;
 layout(location = 0) out float out_expected;
 
+const float MOST = 87.0; // the logarithm of the largest number of 32 bits, and less of the least
+
 void main() {
     vec2 place = gl_FragCoord.xy, p = (place - u_corner) * u_scale, edge = vec2(textureSize(u_velocity, 0)), back = vec2(0.0);
     float grown = 0.0;
@@ -21,5 +24,5 @@ void main() {
         grown = u_cells_a_speed.x * (mac_velocity(u_velocity, halfway + across).x - mac_velocity(u_velocity, halfway - across).x)
               + u_cells_a_speed.y * (mac_velocity(u_velocity, halfway + down).y - mac_velocity(u_velocity, halfway - down).y);
     }
-    out_expected = cubic_texels(u_expected, place + back / u_scale, vec4(0.0)).r - grown;
+    out_expected = clamp(cubic_texels(u_expected, place + back / u_scale, vec4(0.0)).r - grown, -MOST, MOST);
 }

@@ -158,7 +158,10 @@ def test_save_and_load(tmp_path: Path):
         ("[[handle]]\nto = [0.1, 0.1]\npoints = [[0.1, 0.1], [0.2]]", "'points[2][2]' is missing"),
         ("[[handle]]\nat = [0.1, 0.1]\ngoals = [[0.1, true], [0.2, 0.2]]", "'goals[1][2]' must be a number, not true"),
         ("[[handle]]\nat = [{}, 0.1]\nto = [0.1, 0.1]", "handle[1]: 'at[1]' must be a number, not a table"),
-        ("[[handle]]\nname = 'a'\nat = [0.1, 0.1]\nkeys = [[0, 1, {}]]", "handle[1] \"a\": 'keys[1][3]' must be a number"),
+        (
+            "[[handle]]\nname = 'a'\nat = [0.1, 0.1]\nkeys = [[0, 1, {}]]",
+            "handle[1] \"a\": 'keys[1][3]' must be a number",
+        ),
         ("[[pin]]\nname = [3]\nat = [0.1, 0.1]", "line 2: pin[1]: 'name' must be a text in quotes, not a list of 1"),
         ("[[pin]]\npoints = true", "line 2: pin[1]: 'points' must be a list, not true"),
         ("duration = 2020-01-01", "'duration' must be a number, not 2020-01-01"),

@@ -114,9 +114,9 @@ def test_a_part_of_a_map_takes_its_factors_scaled_and_not_whole(device: Device) 
     whole, scaled, unscaled = RNG.standard_normal((3, 12, 20, 2)).astype(np.float32)
     found = drawn(device, "warp/scale.frag", 2, displacement=whole, amount=0.3)
     np.testing.assert_allclose(found, 0.3 * whole, atol=1e-6)
-    given = {"displacement": whole, "scaled": scaled, "unscaled": unscaled}
-    place = {"picture": (2.0, 1.5), "origin": (0.0, 0.0), "step": (1 / 20, 1 / 12)}
-    found = drawn(device, "warp/scale.frag", 2, BENT=1, amount=0.3, **given, **place)
+    given: dict[str, Any] = {"displacement": whole, "scaled": scaled, "unscaled": unscaled}
+    given |= {"picture": (2.0, 1.5), "origin": (0.0, 0.0), "step": (1 / 20, 1 / 12)}
+    found = drawn(device, "warp/scale.frag", 2, BENT=1, amount=0.3, **given)
     x = (np.stack(np.meshgrid(np.arange(20), np.arange(12)), axis=-1) + 0.5) * (2 / 20, 1.5 / 12)
     led = x + 0.3 * whole + scaled - 0.3 * unscaled
     assert ((led < 0) | (led > (2.0, 1.5))).any(), "some would leave the picture"

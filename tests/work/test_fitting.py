@@ -85,6 +85,11 @@ def test_the_same_is_found_again_also_from_what_was_fitted(device: Device):
     ("pairs", "more", "said"),
     [
         ([[[1.2, 0.5], [0.5, 0.5]], [[0.3, 0.3], [0.4, 0.3]]], "", "pair 1 is left out: its point is outside"),
+        (
+            [[[4e3, 0.5], [0.5, 0.5]], [[0.3, 0.3], [0.4, 0.3]]],
+            "",
+            "pair 1 is left out: its point is outside the picture",
+        ),
         ([[[0.3, 0.3], [0.4, 0.3]], [[0.7, 0.5], [1.2, 0.5]]], "", "pair 2 goes only to the picture's edge"),
         (
             [[[0.4, 0.5], [0.5, 0.5]], [[0.4, 0.5], [0.3, 0.5]]],
@@ -96,7 +101,16 @@ def test_the_same_is_found_again_also_from_what_was_fitted(device: Device):
         ([[[0.3, 0.5], [0.5, 0.5]]], WALL, "pair 1 cannot be met: its place is frozen"),
         ([[[0.2, 0.5], [0.8, 0.5]]], WALL, "pair 1 cannot be met: what is frozen lies between its point and its place"),
     ],
-    ids=["point outside", "place outside", "coincident", "crossing", "frozen", "into what is frozen", "beyond a wall"],
+    ids=[
+        "point outside",
+        "far outside",
+        "place outside",
+        "coincident",
+        "crossing",
+        "frozen",
+        "into what is frozen",
+        "beyond a wall",
+    ],
 )
 def test_what_cannot_be_met_is_told_by_number_and_nothing_folds(
     pairs: list[list[list[float]]], more: str, said: str, device: Device

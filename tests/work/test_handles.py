@@ -20,6 +20,7 @@ from solver import Device, Fluid, FluidParams, Grid, Handle, Handles, WarpMap
 from solver.brush.expected import Expected
 from solver.brush.handle import Shape, area, swelling
 from solver.limits import MOST_STRETCH, beside_edges
+from solver.warp.strain import Strain
 from support.leading import PIXELS, RADIUS, arrangement, distortion, led, spline
 
 BLACK = np.zeros((96, 128, 3), np.uint8)
@@ -570,6 +571,24 @@ def test_what_is_local_makes_of_det_j_what_is_expected(device: Device):
     assert determinants.max() > 1.5
     assert np.abs(found / determinants - 1).max() < 0.02
     for thing in (expected, handles, warp, fluid):
+        thing.release()
+
+
+def test_what_a_source_has_fed_for_minutes_is_expected_as_far_as_numbers_go(device: Device):
+    """The picture grew by e^800: what was left of that was divided by zero, and a local handle led by no number."""
+    grid = Grid(16, 16)
+    fluid, warp = Fluid(device, grid), WarpMap(device, grid)
+    expected, strain = Expected(warp), Strain(warp)
+    expected.begin()
+    for sign in (1, -1):
+        fluid.set_velocity(lambda x, y, t, sign=sign: (sign * (x - 0.5), sign * (y - 0.5)))
+        for _ in range(150):
+            expected.follow(fluid, 4.0)
+        assert expected.field is not None
+        assert np.abs(expected.field.get()).max() > 80, "it has come to the end of numbers"
+        with np.errstate(divide="raise", over="raise", invalid="raise"):
+            assert np.isfinite(strain.around(np.array([[0.5, 0.5]]), np.array([0.2]), expected.field)).all()
+    for thing in (expected, strain, warp, fluid):
         thing.release()
 
 
