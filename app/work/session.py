@@ -58,7 +58,9 @@ class Session(Playing):
     def marks(self) -> list[Held]:
         """`held`, where the picture is seen at its amount."""
         held, amount = self.held, 1.0 if self.is_painting else self.replay.recipe.amount
-        return self._once("marks", (self._state, self.target, amount), lambda: held if amount == 1 else as_seen(held, self.replay))
+        return self._once(
+            "marks", (self._state, self.target, amount), lambda: held if amount == 1 else as_seen(held, self.replay)
+        )
 
     @property
     def objections(self) -> tuple[str, ...]:

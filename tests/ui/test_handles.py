@@ -31,6 +31,7 @@ from solver.gl.device import Device
 from support.commands import Run
 from support.drawn import Drawn
 from support.editing import Robot, small_project
+from support.widgets import Widgets
 
 
 @pytest.fixture
@@ -168,6 +169,22 @@ def test_a_handle_is_turned_in_the_inspector_and_arrives(robot: Robot) -> None:
     ring = session.replay.handles.shapes[0]
     arms = (ring[1:] - ring[0]) @ [1, 1j] * np.exp(-1j * np.arange(6) * np.pi / 3)
     assert np.degrees(np.angle(arms.sum())) == pytest.approx(40, abs=1)
+
+
+def test_a_keyframe_does_not_keep_a_turn_from_being_changed_while_it_is_made(robot: Robot, widgets: Widgets) -> None:
+    """Rotate stayed where it was, and a jump came of it where the turn ends."""
+    drag(robot, (0.4, 0.5), (0.45, 0.5))
+    widgets.type("Rotate", "40")
+    robot.rest()
+    session = robot.editor.session
+    session.seek(round(0.5 / session.dt))
+    robot.rest()
+    widgets.click("Add a keyframe here")
+    widgets.type("Rotate", "60")
+    (handle,) = session.recipe.handle
+    assert (handle.rotate, handle.turned) == (60.0, ((pytest.approx(1.0), 60.0, 1.0),))
+    widgets.click("Remove this keyframe")
+    assert session.recipe.handle[0].turned == ()
 
 
 def test_a_turn_that_would_end_later_than_a_recipe_may_is_refused(robot: Robot) -> None:
