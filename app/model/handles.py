@@ -178,7 +178,7 @@ class RecipeHandle(_Led, Course):
         return [key for key in keys if key[0] <= time + SAME_TIME * dt][-1]
 
     def turned_to(self, tick: int, dt: float, rotate: float, scale: float) -> RecipeHandle:
-        """The handle, with another key of its turn and size at a tick; until its first turn is made, with another one."""
+        """The handle, with another key of its turn and size at a tick; until its first turn is made, with that one."""
         time = max(tick * dt, self.upright)
         others = (key for key in self.turned if abs(key[0] - time) > SAME_TIME * dt)
         is_first = self.start < self.upright and time - self.upright <= SAME_TIME * dt
