@@ -66,7 +66,7 @@ class Held:
 
 
 def held_in(replay: Replay, aimed: int = 0) -> list[Held]:
-    """Those that are in force, and where they shall be by the tick `aimed`, or now if later; reads back from the GPU."""
+    """Those that are in force, and where they shall be by the tick `aimed`, or now; reads back from the GPU."""
     tick, dt, extent = replay.tick, replay.recipe.fluid.dt, replay.grid.extent
     led, handles = replay.led, replay.handles
     if not any(one.is_in_force(tick, dt) for _, one in led):
