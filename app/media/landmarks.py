@@ -165,7 +165,7 @@ def _lines(path: Path) -> Lines:
 
 def _read_csv(path: Path, lines: Lines, spacing: float) -> tuple[np.ndarray, tuple[str, ...]]:
     """Pairs (n, 2, 2) in pixels and the curve of each, whose points are so many pixels apart at most."""
-    columns, groups = list(COLUMNS), dict[tuple[str, int], tuple[list[list[float]], list[list[float]]]]()
+    columns, groups = list[str](COLUMNS), dict[tuple[str, int], tuple[list[list[float]], list[list[float]]]]()
     for first, (number, line) in enumerate(lines):
         curve_at = columns.index(CURVE) if CURVE in columns else None
         words = _words(line, (len(columns),) if first else (len(COLUMNS), len(COLUMNS) + 1), curve_at)

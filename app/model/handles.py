@@ -173,15 +173,17 @@ class RecipeHandle(_Led, Course):
         return self
 
     def turn_key(self, tick: int, dt: float) -> Turn:
-        """The last key of its turn and size up to a tick, or that of its first turn."""
-        keys = (self.upright, self.rotate or 0.0, self.scale or 1.0), *self.turned
-        return [key for number, key in enumerate(keys) if not number or key[0] <= (tick + SAME_TIME) * dt][-1]
+        """The last key of its turn and size up to a tick, or that of its first turn, until that is made."""
+        keys, time = ((self.upright, self.rotate or 0.0, self.scale or 1.0), *self.turned), max(tick * dt, self.upright)
+        return [key for key in keys if key[0] <= time + SAME_TIME * dt][-1]
 
     def turned_to(self, tick: int, dt: float, rotate: float, scale: float) -> RecipeHandle:
-        """The handle, with another key of its turn and size at a tick."""
+        """The handle, with another key of its turn and size at a tick; until its first turn is made, with that one."""
         time = max(tick * dt, self.upright)
         others = (key for key in self.turned if abs(key[0] - time) > SAME_TIME * dt)
-        return self.model_copy(update={"turned": tuple(sorted([*others, (time, rotate, scale)]))})
+        is_first = self.start < self.upright and time - self.upright <= SAME_TIME * dt
+        first = {"rotate": rotate, "scale": scale} if is_first else {}
+        return self.model_copy(update={"turned": tuple(sorted([*others, (time, rotate, scale)])), **first})
 
     @property
     def goal(self) -> Point | None:

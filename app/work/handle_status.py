@@ -65,8 +65,8 @@ class Held:
         return self.left > ARRIVED
 
 
-def held_in(replay: Replay) -> list[Held]:
-    """Those that are in force; reads back from the GPU."""
+def held_in(replay: Replay, aimed: int = 0) -> list[Held]:
+    """Those that are in force, and where they shall be by the tick `aimed`, or now; reads back from the GPU."""
     tick, dt, extent = replay.tick, replay.recipe.fluid.dt, replay.grid.extent
     led, handles = replay.led, replay.handles
     if not any(one.is_in_force(tick, dt) for _, one in led):
@@ -75,7 +75,7 @@ def held_in(replay: Replay) -> list[Held]:
     now, starts = handles.middles(shapes), handles.starts
     starts = np.where(np.isnan(starts), now, starts)
     targets = [
-        handle.wanted(start, max(replay.time, handle.ready), dt, np.inf) if handle.goal else start
+        handle.wanted(start, max(replay.time, aimed * dt, handle.ready), dt, np.inf) if handle.goal else start
         for handle, start in zip(handles.handles, starts, strict=True)
     ]
     found = []

@@ -46,15 +46,21 @@ class Session(Playing):
 
     @property
     def held(self) -> list[Held]:
-        """The handles and pins in force at the playhead; looking reads back from the GPU where something has moved."""
+        """The handles and pins in force at the playhead; looking reads back from the GPU where something has moved.
+
+        Each goes to where the hand has led it, however far the simulation is behind the hand.
+        """
         self._take_up()
-        return self._once("held", self._state, lambda: held_in(self.replay))
+        aimed = self.target
+        return self._once("held", (self._state, aimed), lambda: held_in(self.replay, aimed))
 
     @property
     def marks(self) -> list[Held]:
         """`held`, where the picture is seen at its amount."""
         held, amount = self.held, 1.0 if self.is_painting else self.replay.recipe.amount
-        return self._once("marks", (self._state, amount), lambda: held if amount == 1 else as_seen(held, self.replay))
+        return self._once(
+            "marks", (self._state, self.target, amount), lambda: held if amount == 1 else as_seen(held, self.replay)
+        )
 
     @property
     def objections(self) -> tuple[str, ...]:

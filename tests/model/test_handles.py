@@ -121,6 +121,16 @@ def test_a_key_of_a_turn_takes_the_place_of_one_at_the_same_tick() -> None:
     assert one.agrees_until(other, 0.1) == 6
 
 
+def test_another_turn_before_the_first_one_is_made_is_that_one_and_no_jump_at_its_end() -> None:
+    led = handle(rotate=20.0, duration=0.4).turned_to(4, 0.1, 20.0, 1.0).turned_to(8, 0.1, 30.0, 1.0)
+    led = led.turned_to(2, 0.1, 50.0, 2.0)
+    assert (led.rotate, led.scale) == (50.0, 2.0)
+    assert led.turned == ((pytest.approx(0.4), 50.0, 2.0), (pytest.approx(0.8), 30.0, 1.0))
+    assert [led.turn_key(tick, 0.1)[1:] for tick in (1, 4, 7, 8)] == [(50.0, 2.0)] * 3 + [(30.0, 1.0)]
+    late = handle(start=0.2, keys=[]).turned_to(2, 0.1, 30.0, 1.0)  # it has no first turn
+    assert (late.rotate, late.turned) == (None, ((0.2, 30.0, 1.0),))
+
+
 def test_items_are_counted_from_one_handles_first() -> None:
     pin = RecipePin(at=(0.1, 0.1), name="nose")
     led = handle()

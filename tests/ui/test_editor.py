@@ -1811,7 +1811,7 @@ def test_what_the_exported_file_does_not_hold_is_told(robot: Robot, tmp_path: Pa
 
 def test_where_a_recipe_s_stop_ends_an_export_is_told(robot: Robot, tmp_path: Path) -> None:
     """The window plays on, and shows another picture than is written."""
-    push = VortexForce(kind="vortex", point=(0.5, 0.5), radius=0.2, strength=1.0, at=0.0)
+    push = VortexForce(kind="vortex", point=(0.5, 0.5), radius=0.2, strength=1.0, at=(0.0,))
     robot.editor.session.edit("A", force=(push,), duration=0.5, stop=Stop(displacement_above=0.001))
     robot.editor.session.seek(robot.editor.session.end)
     robot.rest()

@@ -18,7 +18,7 @@ from app.model.handles import ARRIVED, MOST_HANDLES, MOST_LINES
 from app.model.recipe import Recipe
 from app.model.windows import with_detail
 from app.progress import Progress
-from app.ui.events import Mods
+from app.ui.events import LEFT, Button, Event, Mods, Move
 from app.ui.theme import packed
 from app.ui.widgets import Ui
 from app.work import journal
@@ -31,6 +31,7 @@ from solver.gl.device import Device
 from support.commands import Run
 from support.drawn import Drawn
 from support.editing import Robot, small_project
+from support.widgets import Widgets
 
 
 @pytest.fixture
@@ -170,6 +171,22 @@ def test_a_handle_is_turned_in_the_inspector_and_arrives(robot: Robot) -> None:
     assert np.degrees(np.angle(arms.sum())) == pytest.approx(40, abs=1)
 
 
+def test_a_keyframe_does_not_keep_a_turn_from_being_changed_while_it_is_made(robot: Robot, widgets: Widgets) -> None:
+    """Rotate stayed where it was, and a jump came of it where the turn ends."""
+    drag(robot, (0.4, 0.5), (0.45, 0.5))
+    widgets.type("Rotate", "40")
+    robot.rest()
+    session = robot.editor.session
+    session.seek(round(0.5 / session.dt))
+    robot.rest()
+    widgets.click("Add a keyframe here")
+    widgets.type("Rotate", "60")
+    (handle,) = session.recipe.handle
+    assert (handle.rotate, handle.turned) == (60.0, ((pytest.approx(1.0), 60.0, 1.0),))
+    widgets.click("Remove this keyframe")
+    assert session.recipe.handle[0].turned == ()
+
+
 def test_a_turn_that_would_end_later_than_a_recipe_may_is_refused(robot: Robot) -> None:
     robot.click(*robot.at(0.4, 0.5))
     robot.rest()
@@ -237,6 +254,21 @@ def test_a_handle_is_picked_again_and_led_on(robot: Robot) -> None:
     robot.key("ctrl+z")
     robot.rest()
     assert robot.editor.session.held[0].now == pytest.approx((0.45, 0.5), abs=4e-3)
+
+
+def test_a_handle_is_led_on_from_where_the_hand_left_it_before_the_simulation_has_come_there(robot: Robot) -> None:
+    """A second handle was set there: on a busy machine the mark was seconds behind."""
+    drag(robot, (0.4, 0.5), (0.42, 0.5))
+    ways = [((0.42, 0.5), (0.45, 0.5)), ((0.45, 0.5), (0.45, 0.56))]
+    events = list[Event]()
+    for start, end in ways:
+        first, last = (Move(*robot.at(*place), 1.0, robot.mods) for place in (start, end))
+        events += [first, Button(LEFT, True, robot.mods), last, Button(LEFT, False, robot.mods)]
+    robot.frame(*events)
+    robot.rest()
+    assert names(robot) == ["Open", "Handle", "Lead on", "Lead on"]
+    (handle,) = robot.editor.session.recipe.handle
+    assert handle.goal == pytest.approx((0.45, 0.56), abs=2e-3)
 
 
 def test_a_click_on_a_handle_selects_it_and_changes_nothing(robot: Robot) -> None:

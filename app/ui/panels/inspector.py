@@ -31,6 +31,7 @@ from app.ui.viewport import Rect
 from app.ui.widgets import Slid, Ui
 from app.ui.workspace import Workspace
 from app.work.session import Session
+from solver.course import SAME_TIME
 
 DETAILS = {128: "coarse", 160: "rather coarse", 192: "medium", 256: "fine", 384: "very fine"}
 GRIDS = tuple(DETAILS)
@@ -218,14 +219,15 @@ def _turn(ui: Ui, session: Session, label: str, led: RecipeHandle) -> None:
     """How a handle is turned and scaled: from its start on, or, once it has keys, at the playhead."""
     tick, dt = session.target, session.dt
     _, rotate, scale = led.turn_key(tick, dt)
-    when = "A keyframe at the playhead." if led.turned else "From its start on."
+    is_early = (tick + SAME_TIME) * dt < led.upright  # its first turn is still being made
+    when = "A keyframe at the playhead." if led.turned and not is_early else "From its start on."
     slid = ui.slider(
         "held rotate", "Rotate", rotate, -180.0, 180.0, DEGREES, 0.0, title="Rotate", more=f"Clockwise. {when}"
     )
-    turned = {"turned": led.turned_to(tick, dt, slid.value, scale).turned} if led.turned else {"rotate": slid.value}
+    turned = _turned(led.turned_to(tick, dt, slid.value, scale)) if led.turned else {"rotate": slid.value}
     _set_held(session, label, f"Turn of a {led.kind}", slid, **turned)
     slid = ui.slider("held scale", "Scale", scale, 0.25, 4.0, PERCENT, 1.0, logarithmic=True, title="Scale", more=when)
-    turned = {"turned": led.turned_to(tick, dt, rotate, slid.value).turned} if led.turned else {"scale": slid.value}
+    turned = _turned(led.turned_to(tick, dt, rotate, slid.value)) if led.turned else {"scale": slid.value}
     _set_held(session, label, f"Scale of a {led.kind}", slid, **turned)
     keyed = led.turned_to(tick, dt, rotate, scale).turned
     is_key = keyed == led.turned
@@ -233,7 +235,12 @@ def _turn(ui: Ui, session: Session, label: str, led: RecipeHandle) -> None:
         kept = tuple(key for key in led.turned if key != led.turn_key(tick, dt)) if is_key else keyed
         session.edit_held(f"Keyframe of a {led.kind}", label, turned=kept)
     more = "Rotate and Scale are kept until here; where you change them at another time, a keyframe is added."
-    ui.tooltip("A keyframe of Rotate and Scale at the playhead", more=more)
+    where = "where its first turn ends" if is_early else "at the playhead"
+    ui.tooltip(f"A keyframe of Rotate and Scale {where}", more=more)
+
+
+def _turned(led: RecipeHandle) -> dict[str, Any]:
+    return {"rotate": led.rotate, "scale": led.scale, "turned": led.turned}
 
 
 def _whereabouts(workspace: Workspace, label: str, led: RecipeHandle | RecipePin) -> str:
