@@ -177,6 +177,10 @@ class RecipeHandle(_Led, Course):
         keys, time = ((self.upright, self.rotate or 0.0, self.scale or 1.0), *self.turned), max(tick * dt, self.upright)
         return [key for key in keys if key[0] <= time + SAME_TIME * dt][-1]
 
+    def is_turning_first(self, tick: int, dt: float) -> bool:
+        """Its first turn is still being made at a tick."""
+        return (tick + SAME_TIME) * dt < self.upright
+
     def turned_to(self, tick: int, dt: float, rotate: float, scale: float) -> RecipeHandle:
         """The handle, with another key of its turn and size at a tick; until its first turn is made, with that one."""
         time = max(tick * dt, self.upright)

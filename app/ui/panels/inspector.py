@@ -31,7 +31,6 @@ from app.ui.viewport import Rect
 from app.ui.widgets import Slid, Ui
 from app.ui.workspace import Workspace
 from app.work.session import Session
-from solver.course import SAME_TIME
 
 DETAILS = {128: "coarse", 160: "rather coarse", 192: "medium", 256: "fine", 384: "very fine"}
 GRIDS = tuple(DETAILS)
@@ -219,7 +218,7 @@ def _turn(ui: Ui, session: Session, label: str, led: RecipeHandle) -> None:
     """How a handle is turned and scaled: from its start on, or, once it has keys, at the playhead."""
     tick, dt = session.target, session.dt
     _, rotate, scale = led.turn_key(tick, dt)
-    is_early = (tick + SAME_TIME) * dt < led.upright  # its first turn is still being made
+    is_early = led.is_turning_first(tick, dt)
     when = "A keyframe at the playhead." if led.turned and not is_early else "From its start on."
     slid = ui.slider(
         "held rotate", "Rotate", rotate, -180.0, 180.0, DEGREES, 0.0, title="Rotate", more=f"Clockwise. {when}"
