@@ -314,8 +314,8 @@ def objections(
         if ends.size:
             yield f"{way.label} goes only to the picture's edge: {_shown(ends[0] / extent)} is outside the picture"
         elif way.far > LARGEST_LEAD:
-            more = f"of {way.far:.3g} to its goal; give it a larger reach (radius)"
-            yield f"{way.label} goes only {LARGEST_LEAD:g} times as far as it reaches, {more}"
+            more = f"and it goes {LARGEST_LEAD:g} times at most; give it a larger reach (radius)"
+            yield f"{way.label} has its goal {way.far:.3g} times as far away as it reaches, {more}"
         if way.led.closed and _area(way.before) * _area(way.after) < 0:
             yield f"{way.label} is turned inside out by its goals"
     for one, other in combinations([way for way in led if way.led.takes_hold], 2):

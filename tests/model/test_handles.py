@@ -161,7 +161,9 @@ def test_a_long_line_reaches_as_far_as_a_part_of_its_length_and_an_outline_has_o
     corners, to = [[0.1, 0.1], [0.5, 0.1], [0.5, 0.2]], [0.6, 0.8]
     length = 0.4 + 0.1 + math.hypot(0.4, 0.1) * closed
     led = RecipeHandle.model_validate(frozen({"points": corners, "to": to, "closed": closed, "radius": 0.01}))
-    far = re.search(r"as far as it reaches, of ([\d.]+) to its goal", " ".join(objections([led], [], (1.0, 1.0))))
+    far = re.search(
+        r"has its goal ([\d.]+) times as far away as it reaches", " ".join(objections([led], [], (1.0, 1.0)))
+    )
     assert far is not None
     goal = np.add(corners, np.subtract(to, led.at))
     assert float(far[1]) == pytest.approx(np.hypot(*(goal - corners).T).max() / (length / LONGEST_LINE), rel=5e-3)
@@ -190,7 +192,8 @@ def test_a_handle_goes_two_radii_at_most() -> None:
     assert [*objections([handle(to=[0.699, 0.5])], [], (1.0, 1.0))] == []
     (said,) = objections([handle(to=[0.75, 0.5])], [], (1.0, 1.0))
     assert said == (
-        "handle[1] goes only 2 times as far as it reaches, of 2.5 to its goal; give it a larger reach (radius)"
+        "handle[1] has its goal 2.5 times as far away as it reaches, and it goes 2 times at most; "
+        "give it a larger reach (radius)"
     )
     assert [*objections([handle(to=[0.5, 0.75])], [], (1.0, 0.75))] == []
 
@@ -239,7 +242,9 @@ def test_sixty_four_handles_and_pins_work() -> None:
 
 def test_the_window_calls_the_radius_as_its_slider_is_called() -> None:
     (said,) = objections([handle(to=[0.75, 0.5])], [], (1.0, 1.0))
-    assert heading(said) == "Handle 1 goes only 2 times as far as it reaches, of 2.5 to its goal; give it a larger Size"
+    assert heading(said) == (
+        "Handle 1 has its goal 2.5 times as far away as it reaches, and it goes 2 times at most; give it a larger Size"
+    )
 
 
 def test_the_window_tells_how_far_in_pixels_alone() -> None:
