@@ -64,6 +64,7 @@ class EditorState:
         tool_name: the tool in hand.
         tool_seen: the one that the strip was scrolled to last.
         brushes: of the tools for which something has been set, by their names.
+        suited: how local pushes have been made for the fluid of the work that is open; None for one that is no feel.
         stabiliser: points of the screen, of the string that the pen pulls the brush by; 0 is none.
         preset_name: that has been typed for the brush, to keep it by.
         opposite: tools that are switched to their other direction.
@@ -96,6 +97,7 @@ class EditorState:
     tool_name: str = "push"
     tool_seen: str = ""
     brushes: dict[str, BrushSettings] = field(default_factory=dict)
+    suited: float | None = None
     stabiliser: float = 0.0
     preset_name: str = ""
     opposite: dict[str, bool] = field(default_factory=dict)
@@ -160,16 +162,23 @@ class EditorState:
         self._set_brush(radius=preset.radius, hardness=preset.hardness, strength=preset.strength)
 
     def make_local(self, local: float) -> None:
-        """Let what pushes be so local, whichever tool it is done with."""
+        """Let what pushes be so local, whichever tool it is done with, as is best for a feel of the fluid."""
+        self.suited = local
         for name, tool in TOOL.items():
             if "local" in tool.settings:
                 self.brushes[name] = replace(self.brushes.get(name, BrushSettings()), local=local)
 
     def suit(self, fluid: FluidSettings) -> None:
-        """Let pushes be as local as is best for the fluid of a work that is opened, unless a person has set a part."""
-        best = [feel.local for feel in FEELS if feel.fits(fluid)]
-        if best and {brush.local for brush in self.brushes.values()} <= {feel.local for feel in FEELS}:
-            self.make_local(best[0])
+        """Let pushes be as local as is best for the fluid of a work that is opened.
+
+        What a person has set stays if it is another part, or if the fluid is as that of the work before.
+        """
+        best = next((feel.local for feel in FEELS if feel.fits(fluid)), None)
+        before, self.suited = self.suited, best
+        if best is None or best == before:
+            return
+        if {brush.local for brush in self.brushes.values()} <= {feel.local for feel in FEELS}:
+            self.make_local(best)
 
     @property
     def is_opposite(self) -> bool:

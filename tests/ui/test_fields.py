@@ -181,9 +181,10 @@ def test_a_work_that_is_opened_makes_pushes_as_local_as_its_fluid_wants(robot: R
     for project, local in ((putty, 1.0), (honey, 0.0)):
         robot.editor.open(project)
         assert state.brush.local == local
-    state.brush = replace(state.brush, local=0.4)
-    robot.editor.open(putty)
-    assert state.brush.local == 0.4, "set by hand"
+    for project, local in ((honey, 1.0), (putty, 0.4)):
+        state.brush = replace(state.brush, local=local)
+        robot.editor.open(project)
+        assert state.brush.local == local, "set by hand"
 
 
 def test_every_kind_of_edge_of_the_picture_is_what_it_is_called(robot: Robot, widgets: Widgets) -> None:
