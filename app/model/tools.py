@@ -16,6 +16,7 @@ from app.model.strokes import BrushPath, Stroke, Symmetry, ToolName
 from app.model.windows import FLOWING
 
 FASTEST = 2.0  # longer sides per second that a brush can follow
+LEAST_STEP = 1e-5  # longer sides: the last digit of places as fractions of the picture
 LINE_SPEED = 0.8  # longer sides per second at which a stroke is drawn that was only clicked
 DRAWN = 0.004  # longer sides between places of a path that is drawn
 MOST_CORNERS = 200  # of a line that is drawn
@@ -215,20 +216,22 @@ def _follow(stroke: Stroke | MaskStroke, press: Press) -> Gesture:
         path.wanted.append((x, y))
         for place in path.follow():
             stroke = stroke.with_sample(tick, *place, pressure)
+    left = []
     while path.wanted:
         tick += 1
         path.refresh()
-        for place in path.follow():
-            stroke = stroke.with_sample(tick, *place, pressure)
-    return stroke
+        left += [(tick, *place, pressure) for place in path.follow()]
+    return stroke.model_copy(update={"samples": (*stroke.samples, *left)})
 
 
 def farthest(stroke: Stroke | MaskStroke, dt: float) -> float:
     """How far the brush of a stroke follows the pointer in a tick of `dt` seconds, in longer sides.
 
     A push no farther than its radius: that is as far as it carries anything in one step (solver/README.md, *Slipping*).
+    Nor less than a place can tell, or a stroke that is let go would never end.
     """
-    return min(FASTEST * dt, stroke.radius) if stroke.tool == "push" else FASTEST * dt
+    far = min(FASTEST * dt, stroke.radius) if stroke.tool == "push" else FASTEST * dt
+    return max(far, LEAST_STEP)
 
 
 class _Path:
@@ -274,12 +277,8 @@ def _line(press: Press, stroke: Stroke | MaskStroke, start: tuple[float, float])
     tick, x, y, pressure = stroke.samples[0]
     length = hypot((x - start[0]) * press.extent[0], (y - start[1]) * press.extent[1])
     steps = max(2, round(length / LINE_SPEED / press.dt), ceil(length / farthest(stroke, press.dt)))
-    stroke = stroke.model_copy(update={"samples": ((tick, *start, pressure),)})
-    for k in range(1, steps + 1):
-        part = k / steps
-        stroke = stroke.with_sample(
-            tick + k, start[0] + (x - start[0]) * part, start[1] + (y - start[1]) * part, pressure
-        )
+    way = ((tick + k, *(a + (b - a) * (k / steps) for a, b in zip(start, (x, y), strict=True))) for k in range(steps + 1))
+    stroke = stroke.model_copy(update={"samples": tuple((*place, pressure) for place in way)})
     while (yield stroke) is not None:
         pass
     return stroke

@@ -100,6 +100,19 @@ def test_a_push_follows_no_faster_than_its_radius_a_tick(last: tuple[float, floa
             assert stroke.last_tick - stroke.first_tick == pytest.approx(0.211 / farthest, abs=1)
 
 
+def test_a_stroke_in_ticks_of_a_microsecond_goes_on() -> None:
+    """It goes less than the last digit of a place in each, and was never done with its way once it was let go."""
+    gesture = TOOL["push"].gesture
+    assert gesture is not None
+    drawing = gesture(Press(BrushSettings(), False, EXTENT, 1e-6), Touch(0, 0.5, 0.5))
+    next(drawing)
+    for tick in range(1, 9):
+        stroke = drawing.send(Touch(tick, 0.6, 0.55))
+    assert isinstance(stroke, Stroke)
+    places = [sample[1:3] for sample in stroke.samples]
+    assert len(set(places)) == len(places) == 9
+
+
 def test_a_fast_pointer_is_followed_along_its_path() -> None:
     corner = [Touch(0, 0.2, 0.2), Touch(1, 0.8, 0.2), Touch(1, 0.8, 0.8)]
     stroke = play("push", *corner)
