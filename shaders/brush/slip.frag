@@ -1,6 +1,6 @@
 // Slip: the part of its own speed that a push gives to the fluid, into a texel for each image: 1 for what lies as it lay in the
 // picture, less the more radii it has come with the brush already and the more the push would stretch what is stretched
-// several times over. Drawn out without end, it would become thinner than a cell, and the map fold there.
+// several times over. Drawn out without end, it would become finer than the map, which would fold there.
 //   dC/dt = -(grad v)^T C - C grad v,  C = J^T J,  J = I + grad D:  growth = -2 (C : grad v) / tr C for the brush's own
 //   flow v = curl (b (F x r)), F a unit, so in e-folds of C a radius of the path; strain = sqrt(tr C / 2) growth where
 //   that is positive, in the mean over the brush of its fourth power.
@@ -8,7 +8,7 @@
 // u_around: the warp map's displacement on a lattice around each, one below the other, longer sides, their texels 1 / fine of
 // the radius apart, the middle ones at u_places (longer sides); u_extent: width and height of the domain, longer sides.
 // u_velocities: the brush's, lengths / s; u_carried: radii that something is carried before the push slips, and the least that it
-// gives for that reason; u_strain: where it begins to slip, and gives nothing.
+// gives for that reason; u_strain: where it begins to slip, and gives nothing; u_hold: 0-1, how little of both.
 // reads: 1157
 #include "lib/brush.glsl"
 #include "lib/images.glsl"

@@ -1,8 +1,8 @@
 // Seek: where points of the original are, x with x + D(x) = y, by Newton's method from guesses out of a list: how far x is
 // from the guess, and x + D(x) from y (longer sides).
 // The guess, and what is told of it: see lib/place.glsl; the latter is guess - y, then how far a round may go, longer sides.
-// reads: 408, and 96 more for each of LEVELS above 1, 210 for each of CLOSED, 32 for each of WEIGHED; of six rounds, of which
-// two or three are usual
+// reads: 544, and 128 more for each of LEVELS above 1, 416 for each of CLOSED, 64 for each of WEIGHED; of eight rounds, of
+// which two or three are usual
 #define POINTS 1
 #include "lib/warp.glsl"
 #include "lib/place.glsl"

@@ -41,6 +41,7 @@ class Tip:
         radius: in lengths.
         hardness: 0 is a soft falloff, 1 a core of nine tenths of the radius.
         near: it takes back within `NEAR` radii the area and the momentum that it gives, so that the rest feels nothing.
+            Its radius is at most a quarter of the largest then.
         others: its images, by symmetry. Where they overlap, what moves the fluid is shared out among them.
 
     Raises:
@@ -72,15 +73,16 @@ class Tip:
             raise ValueError(f"a brush with {len(self.paths)} images was given; it must be at most {MOST_IMAGES}")
         for number in (self.radius, self.hardness):
             check_type("a number of a brush", number)
-        if not SMALLEST <= self.radius <= FARTHEST:
-            raise ValueError(f"a brush of radius {self.radius} was given; it must be from 1e-06 to {FARTHEST:g}")
+        most = FARTHEST / NEAR if self.near else FARTHEST  # also of `wide`
+        if not SMALLEST <= self.radius <= most:
+            raise ValueError(f"a brush of radius {self.radius} was given; it must be from {SMALLEST:g} to {most:g}")
         if math.isnan(self.hardness):
             raise ValueError("a brush's hardness must be a number from 0 to 1")
 
     @property
     def wide(self) -> Tip:
         """The soft one on the same path under which it takes back."""
-        return replace(self, radius=NEAR * self.radius, hardness=0.0)
+        return replace(self, radius=NEAR * self.radius, hardness=0.0, near=False)
 
     @property
     def paths(self) -> tuple[Path, ...]:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from solver import limits
+from solver.brush.tip import Tip
 from solver.grid import Grid
 from solver.params import FluidParams, NoSlip, Walls
 
@@ -29,6 +30,16 @@ def test_a_viscosity_is_from_none_to_a_million() -> None:
             limits.viscosities(value)
     with pytest.raises(ValueError, match=r"of shape \(3, 2\) was given, \(2, 3\) is wanted"):
         limits.viscosities(np.zeros((3, 2)), (2, 3))
+
+
+def test_a_brush_is_from_a_millionth_to_a_hundred_and_less_if_it_takes_back_around_itself() -> None:
+    place = 0.5, 0.5
+    for near, most in ((False, 100.0), (True, 25.0)):
+        assert (Tip(place, place, 1e-6, near=near).radius, Tip(place, place, most, near=near).radius) == (1e-6, most)
+        for radius in (9e-7, most + 0.1, float("nan")):
+            with pytest.raises(ValueError, match=f"it must be from 1e-06 to {most:g}"):
+                Tip(place, place, radius, near=near)
+    assert Tip(place, place, 25.0, near=True).wide.radius == 100
 
 
 def test_what_is_put_in_is_no_larger_than_a_million_either_way() -> None:
