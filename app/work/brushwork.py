@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import hypot
+from sys import float_info
 
 import numpy as np
 
@@ -80,7 +81,7 @@ class Brushwork:
             case "curve":
                 for tip, amount in tips:
                     length = hypot(tip.end[0] - tip.start[0], tip.end[1] - tip.start[1])
-                    if length:
+                    if length >= float_info.min:  # a shorter one has no speed
                         self._brush.push(fluid, tip, length / BLOW, amount)
             case "twirl":
                 self._lead(scene, Twirl(whole, TWIRL * pressed))

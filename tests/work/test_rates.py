@@ -94,6 +94,13 @@ def test_several_pressures_in_one_tick_paint_a_mask_piece_by_piece(
     assert np.abs(painted[0] - painted[1]).max() < 1e-3 * painted[1].max()
 
 
+def test_a_curve_that_is_shorter_than_numbers_tell_blows_nothing(device: Device) -> None:
+    """Its length over its speed was a time whose inverse is infinite."""
+    with replayed(device, "curve", (0, 1.0), samples=((0, 0.0, 0.5, 1.0), (0, 1e-310, 0.5, 1.0))) as replay:
+        replay.seek(TICKS)
+        assert not replay.warp.read().any()
+
+
 def test_a_curve_blows_at_half_a_side_a_second(device: Device) -> None:
     samples = ((0, 0.3, 0.5, 1.0), (0, 0.7, 0.5, 1.0))
     with replayed(device, "curve", (0, 1.0), viscosity=1e-4, samples=samples) as replay:
