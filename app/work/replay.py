@@ -282,7 +282,13 @@ class Replay:
         brushwork.begin()
         with self.device.stage("brush"):
             for act in acts:
-                painted |= brushwork.draw(scene, act.stroke, act.tick, act.dabs)
+                try:
+                    painted |= brushwork.draw(scene, act.stroke, act.tick, act.dabs)
+                except ValueError as error:  # of a speed, to which the length of a tick belongs
+                    name, mend = f"stroke[{self.recipe.stroke.index(act.stroke) + 1}]", "let it take more ticks"
+                    raise UserError(
+                        f"{name}: at {self.tick * dt:.6g} s {error}; {mend}, or make fluid.dt longer"
+                    ) from None
             if painted:
                 self._apply_masks()
             if leads:

@@ -10,6 +10,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from app.errors import UserError
 from app.media.auxiliary import Pictures
 from app.model.picture import Picture
 from app.model.recipe import Recipe
@@ -92,6 +93,18 @@ def test_several_pressures_in_one_tick_paint_a_mask_piece_by_piece(
     row = painted[1][painted[1].shape[0] // 2]
     assert row[len(row) * 2 // 5] < row[len(row) * 3 // 5]
     assert np.abs(painted[0] - painted[1]).max() < 1e-3 * painted[1].max()
+
+
+def test_a_push_faster_than_the_solver_follows_is_said_by_its_number(device: Device) -> None:
+    """In ticks of a nanosecond, and so thick a fluid that nothing coasts."""
+    stroke = {"tool": "push", "radius": 0.01, "samples": ((0, 0.1, 0.5, 1.0), (3, 0.9, 0.5, 1.0))}
+    recipe = Recipe.model_validate({"fluid": {"dt": 1e-9, "viscosity": 1000}, "stroke": (stroke,), "duration": 4e-9})
+    replay = Replay(device, recipe, Pictures(Picture(np.zeros((96, 128, 3), np.uint8))))
+    said = r"stroke\[1\]: at 1e-09 s a push's speed of 1[.\d]+ was given; .*; let it take more ticks, or make"
+    with pytest.raises(UserError, match=said):
+        replay.seek(4)
+    assert replay.tick == 0
+    replay.release()
 
 
 def test_a_curve_that_is_shorter_than_numbers_tell_blows_nothing(device: Device) -> None:
