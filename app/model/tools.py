@@ -277,8 +277,9 @@ def _line(press: Press, stroke: Stroke | MaskStroke, start: tuple[float, float])
     tick, x, y, pressure = stroke.samples[0]
     length = hypot((x - start[0]) * press.extent[0], (y - start[1]) * press.extent[1])
     steps = max(2, round(length / LINE_SPEED / press.dt), ceil(length / farthest(stroke, press.dt)))
-    way = ((tick + k, *(a + (b - a) * (k / steps) for a, b in zip(start, (x, y), strict=True))) for k in range(steps + 1))
-    stroke = stroke.model_copy(update={"samples": tuple((*place, pressure) for place in way)})
+    (x0, y0), parts = start, (k / steps for k in range(steps + 1))
+    samples = ((tick + k, x0 + (x - x0) * part, y0 + (y - y0) * part, pressure) for k, part in enumerate(parts))
+    stroke = stroke.model_copy(update={"samples": tuple(samples)})
     while (yield stroke) is not None:
         pass
     return stroke
