@@ -321,7 +321,8 @@ def _lead(press: Press, first: Touch) -> Gesture:
         if len(touches) < 2:
             return None
         length = sum(_distance(press, one, other) for one, other in pairwise(touches))
-        corners = [(touch.x, touch.y) for touch in touches[:: ceil(len(touches) / MOST_CORNERS)]]
+        every = ceil((len(touches) - 1) / (MOST_CORNERS - 1))
+        corners = [(touch.x, touch.y) for touch in (*touches[:-1:every], touches[-1])]
         points = tuple(press.under(corners))
         if (different := len(set(points))) < 2:
             return None

@@ -211,6 +211,15 @@ def test_a_line_there_and_back_is_open_and_one_of_a_single_place_of_the_original
     assert gestured("handle", press, *there_and_back) is None
 
 
+@pytest.mark.parametrize("count", [200, 201, 202, 1000])
+def test_a_line_of_many_touches_has_fewer_corners_and_both_its_ends(count: int) -> None:
+    touches = [Touch(n, 0.2 + 0.6 * (n % 2), 0.1 + 0.8 * n / (count - 1), shift=True) for n in range(count)]
+    line = gestured("handle", Press(BrushSettings(), False, EXTENT, DT), *touches)
+    assert isinstance(line, RecipeHandle)
+    assert (line.points[0], line.points[-1]) == (touches[0][1:3], touches[-1][1:3])
+    assert 100 <= len(line.points) <= 200
+
+
 def test_a_handle_that_is_taken_again_goes_as_far_as_the_pointer_but_not_out_of_the_picture() -> None:
     held = RecipeHandle(at=(0.1, 0.1), keys=())
     press = Press(BrushSettings(), False, EXTENT, DT, held=held, rests=(0.3, 0.9))
