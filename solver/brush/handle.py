@@ -6,17 +6,15 @@ Long, as a handle and its shape share what is found out here about lines and out
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from operator import itemgetter
 
 import numpy as np
 
 from solver.brush.tip import FARTHEST, SMALLEST, Point
-from solver.course import SAME_TIME, Course
+from solver.course import Course, between
 from solver.limits import (
     LARGEST_LEAD,
     LEAST_SCALE,
@@ -163,7 +161,7 @@ class Handle(Course):
                 return start
             part, (x, y) = self.passed(time), within(self.to)
             return np.array((x0 + part * x, y0 + part * y))
-        here, there, part = _between((x0, y0) if self.to is None else self.to, self.ready, self.keys, time, dt)
+        here, there, part = between((x0, y0) if self.to is None else self.to, self.ready, self.keys, time, dt)
         x, y = within(here)
         if part == 0:
             return np.array((x0 + x, y0 + y))
@@ -175,7 +173,7 @@ class Handle(Course):
         rotate, scale = self.rotate or 0.0, self.scale or 1.0
         if not self.turned or time < self.upright:
             return math.radians(rotate) * self.passed(time), scale ** self.passed(time)
-        here, there, part = _between((rotate, scale), self.upright, self.turned, time, dt)
+        here, there, part = between((rotate, scale), self.upright, self.turned, time, dt)
         angle = (1 - part) * here[0] + part * there[0]
         return math.radians(angle), here[1] ** (1 - part) * there[1] ** part
 
@@ -395,23 +393,6 @@ def _crosses_itself(loop: np.ndarray) -> bool:
 
     parted = side_of(loop) * side_of(ends) < 0
     return bool((parted & parted.T).any())
-
-
-def _between(
-    first: Point, since: float, keys: Sequence[tuple[float, float, float]], time: float, dt: float
-) -> tuple[Point, Point, float]:
-    """The last of some keys (t, a, b) that has come, the next, and the part of the way between them, without the times;
-    `first` has come at `since`.
-    """
-    here, number = first, bisect_right(keys, time + SAME_TIME * dt, key=itemgetter(0))
-    if number:
-        since, *_ = keys[number - 1]
-        here = keys[number - 1][1:]
-    # At a key nothing of what comes later is seen.
-    if number == len(keys) or keys[number][0] == since or abs(time - since) <= SAME_TIME * dt:
-        return here, here, 0.0
-    until, *there = keys[number]
-    return here, (there[0], there[1]), (time - since) / (until - since)
 
 
 def _line(corners: Sequence[Point], closed: bool) -> np.ndarray:
