@@ -190,6 +190,12 @@ class RecipeHandle(_Led, Course):
         first = {"rotate": rotate, "scale": scale} if is_first else {}
         return self.model_copy(update={"turned": tuple(sorted([*others, (time, rotate, scale)])), **first})
 
+    def without_turn_key(self, tick: int, dt: float) -> RecipeHandle:
+        """The handle without `turn_key`; one that is then led nowhere waits to be, as one that has just been set."""
+        key = self.turn_key(tick, dt)
+        kept = self.model_copy(update={"turned": tuple(each for each in self.turned if each != key)})
+        return kept if kept.is_led else kept.model_copy(update={"keys": ()})
+
     @property
     def goal(self) -> Point | None:
         """Where it is led in the end; None if nowhere but where it is at its start."""
