@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import inf, sqrt
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -40,7 +40,7 @@ from app.progress import Progress
 from app.work.loaded_handles import LoadedHandles
 from app.work.observation import observe
 from app.work.replay import Replay
-from solver.brush.handle import Shape, area
+from solver.brush.handle import Shape
 from solver.components import connected_components
 from solver.gl.device import Device
 from solver.warp.inverse import ForwardMap
@@ -278,7 +278,7 @@ class _Lead:
         swung = np.vdot(arms, ends) / np.vdot(arms, arms).real
         found = float(np.degrees(np.angle(swung)))
         found += 360 * round((angle - found) / 360)
-        grown = sqrt(abs(area(self.ends[1:]) / area(self.begins[1:]))) if self.shape.is_ring else abs(swung)
+        grown = self.shape.grown(self.begins, self.ends) if self.shape.is_ring else abs(swung)
         return (
             _rounded(float(np.clip(found, -MOST_TURNED, MOST_TURNED))),
             _rounded(float(np.clip(grown, LEAST_SCALE, MOST_SCALE))),

@@ -326,10 +326,19 @@ class Shape:
         left = places - ends
         if self.is_ring:
             arms = places[1:] - places[0]
-            grown = math.sqrt(abs(area(places[1:]) / (area(ends[1:]) or 1.0)))
-            turned, scaled = float(spun(left[1:] - left[0], arms)), abs(grown - 1) * float(np.hypot(*arms.T).mean())
+            turned = float(spun(left[1:] - left[0], arms))
+            scaled = abs(self.grown(ends, places) - 1) * float(np.hypot(*arms.T).mean())
             return float(np.hypot(*left[0]) + math.hypot(turned, scaled))
         return float(np.hypot(*left.T).max())
+
+    def grown(self, before: np.ndarray, after: np.ndarray) -> float:
+        """How many times as large a ring is at some places as at others, (n, 2) each, by the area within it; or by its
+        arms, where in a corner of the picture only two of its points are, which have none.
+        """
+        if self.around is None:
+            then, now = (float(np.hypot(*(places[1:] - places[0]).T).mean()) for places in (before, after))
+            return now / (then or 1.0)
+        return math.sqrt(abs(area(after[1:]) / (area(before[1:]) or 1.0)))
 
     def _about(self, there: np.ndarray, starts: np.ndarray, time: float, dt: float = 1.0) -> np.ndarray:
         """Its points with the handle at a place, turned as at a time."""

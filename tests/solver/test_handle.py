@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from solver.brush.handle import Handle
+from solver.brush.handle import Handle, Shape
 
 DT = 0.02
 TIMES = np.linspace(0, 4, 401)
@@ -64,3 +64,16 @@ def test_a_handle_goes_no_farther_than_so_many_radii() -> None:
         far = np.hypot(*way)
         wanted = 0.5 + way * min(1.0, 0.2 / far)
         assert handle.wanted(np.array((0.5, 0.5)), time, DT, 2.0) == pytest.approx(wanted, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("at", "extent"), [((0.01, 0.01), (1.0, 1.0)), ((1.0, 0.99), (1.0, 1.0)), ((0.5, 0.02), (1.0, 0.04))]
+)
+def test_what_is_turned_in_a_corner_is_no_farther_away_than_it_is(at: tuple[float, float], extent: tuple[float, float]):
+    """Two points of its ring lie in the picture, which have no area: it was a radius / 4 away for ever."""
+    shape = Shape.of(Handle(at, radius=0.25, rotate=0.0), extent)
+    assert len(shape.led) == 3
+    assert shape.away(shape.led, shape.due(shape.led, 0.0, DT)) == pytest.approx(0, abs=1e-12)
+    wider = shape.led[0] + 1.1 * (shape.led - shape.led[0])
+    assert shape.away(wider, shape.led) == pytest.approx(0.1 * 1.1 * 0.25 / 4, rel=1e-6)
+    assert shape.grown(shape.led, wider) == pytest.approx(1.1)
