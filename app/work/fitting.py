@@ -648,7 +648,8 @@ class _Search:
         arrived, off = np.full((len(self.pairs), 2), np.nan), np.full((len(self.pairs), 2), np.nan)
         several = np.split(points, np.cumsum([len(lead.shape.led) for lead in leads])[:-1])
         for number, lead, places in zip(self.numbers, leads, several, strict=True):
-            arrived[number], off[number] = lead.shape.middle(places) / self.extent, lead.off(places)
+            arrived[number] = lead.shape.place(places, lead.begins) / self.extent
+            off[number] = lead.off(places)
         residuals = off[self.hopeful, 1]
         return Trial(recipe, arrived, off[:, 0], residuals, work, found.det_min, found.folds, verdict)
 

@@ -282,6 +282,18 @@ class Shape:
             return places[0]
         return places.mean(axis=0) + (self.handle.at - self.led.mean(axis=0))
 
+    def place(self, places: np.ndarray, starts: np.ndarray) -> np.ndarray:
+        """Where `at` of the handle is, (2,), with its points at these places, which were at `starts` when it began.
+
+        Beside the middle of a line it is turned and scaled as that is.
+        """
+        if not self.handle.points:
+            return places[0]
+        (x, y), (now_x, now_y) = ((each - each.mean(axis=0)).T for each in (starts, places))
+        along, across = (x * now_x + y * now_y).sum(), (x * now_y - y * now_x).sum()
+        turn = np.array([[along, across], [-across, along]]) / max(float((x**2 + y**2).sum()), 1e-30)
+        return places.mean(axis=0) + (self.handle.at - self.led.mean(axis=0)) @ turn
+
     def wanted(self, starts: np.ndarray, time: float, dt: float) -> np.ndarray:
         """Where its points shall be at a time, (n, 2), if they were at `starts` when it began; see `Handle.wanted`."""
         handle, middle = self.handle, self.middle(starts)

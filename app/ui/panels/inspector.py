@@ -251,7 +251,7 @@ def whereabouts(workspace: Workspace, label: str, led: RecipeHandle | RecipePin)
         if held.label == label:
             way = hypot(*np.subtract(held.start, held.target) * session.extent)
             turns, bends = (led.turns, bool(led.goals)) if isinstance(led, RecipeHandle) else (False, False)
-            at_most = "up to " * bool(led.points or turns)
+            at_most = "up to " * (turns or bends)
             rest = f", {at_most}{pixels * held.left:.0f} px left" if held.is_away else ""
             if pixels * way >= 0.5:  # less would be told as 0
                 return f"moves {pixels * way:.0f} px{rest}"
