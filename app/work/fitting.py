@@ -48,7 +48,7 @@ from solver.warp.inverse import ForwardMap
 EVALUATIONS = 32  # replays on the coarse grid
 A_FINE_ONE = 8  # of them for each on the recipe's own
 COARSE_GRID, COARSE_PICTURE, COARSE_DT = 64, 512, 1 / 30
-ALONE = 12  # pairs up to which each handle has values of its own: with more, all have the same
+ALONE = 12  # pairs up to which each handle has values of its own: with more, all change alike
 LEAST_DET = 0.2  # of the map, anywhere
 # What is searched, from and to: radii in longer sides, stiffnesses, durations in parts of the recipe's, viscosities.
 RANGES = (0.06, 0.5), (0.05, 1.0), (0.3, 0.9), (3e-4, 0.3)

@@ -270,6 +270,11 @@ class Shape:
         """True if all but the first of its points are a ring."""
         return len(self.led) > 1 and not self.handle.points
 
+    @property
+    def _is_point(self) -> bool:
+        """True if it leads its place alone. Of a line that is one place in the picture, too, but not that of `at`."""
+        return len(self.led) == 1 and not self.handle.points
+
     @cached_property
     def is_in_picture(self) -> bool:
         """True if some of it lies in the picture; of what is all outside nothing is led."""
@@ -300,7 +305,7 @@ class Shape:
         there = handle.wanted(middle, time, dt)
         if not handle.points:
             there = np.clip(there, *self.edges(middle))
-        if len(starts) == 1:
+        if self._is_point:
             return there[None]
         there = self._about(there, starts, time, dt)
         way = (np.clip(there, *self.edges(starts)) if handle.points else there) - starts
@@ -354,7 +359,7 @@ class Shape:
 
     def _about(self, there: np.ndarray, starts: np.ndarray, time: float, dt: float = 1.0) -> np.ndarray:
         """Its points with the handle at a place, turned as at a time."""
-        if len(starts) == 1:
+        if self._is_point:
             return there[None]
         return np.clip(self.laid(there, starts, time, dt), 0.0, self.extent)
 

@@ -30,7 +30,7 @@ from solver.warp.map import WarpMap
 from solver.warp.strain import Strain
 
 RATE = 8.0  # 1 / s: at which what is left of a way is gone
-# Radii that a handle goes in a tick at most: its push strains what is beside it by up to 7 times as much (H2), and a
+# Radii that a handle goes in a tick at most: its push strains what is beside it by up to 5.4 times as much (H2), and a
 # step of the map follows a strain of 1/2.
 FARTHEST_STEP = 0.07
 # Added to the squares of the influences, which are 1 for a handle by itself: of two that lie on one another nothing

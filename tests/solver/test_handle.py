@@ -77,3 +77,15 @@ def test_what_is_turned_in_a_corner_is_no_farther_away_than_it_is(at: tuple[floa
     wider = shape.led[0] + 1.1 * (shape.led - shape.led[0])
     assert shape.away(wider, shape.led) == pytest.approx(0.1 * 1.1 * 0.25 / 4, rel=1e-6)
     assert shape.grown(shape.led, wider) == pytest.approx(1.1)
+
+
+@pytest.mark.parametrize("goals", [(), ((-0.5, 0.6), (0.02, 0.6))])
+def test_a_line_of_which_one_point_is_in_the_picture_leads_that_to_its_own_place(goals: tuple):
+    """It was led where the middle of the line was to be, outside: a pin drew the picture out to its edge."""
+    handle = Handle((-0.24, 0.5), points=((-0.5, 0.5), (0.02, 0.5)), goals=goals)
+    shape = Shape.of(handle, (1.0, 1.0))
+    assert shape.led == pytest.approx(np.array([(0.02, 0.5)]))
+    there = np.array([goals[1] if goals else (0.02, 0.5)])
+    assert shape.wanted(shape.led, handle.last, DT) == pytest.approx(there)
+    assert shape.due(shape.led, handle.last, DT) == pytest.approx(there)
+    assert shape.short_of_edges(shape.led) == pytest.approx(0)
