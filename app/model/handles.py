@@ -14,7 +14,7 @@ from pydantic import Field, model_validator
 from app.model.sampling import Point
 from app.model.schema import Fraction01, Model, Place, Several, label_of
 from app.model.strokes import FINEST_DETAIL
-from solver.course import SAME_TIME, Course
+from solver.course import SAME_TIME, Course, between
 from solver.limits import (
     LARGEST_LEAD,
     LEAST_SCALE,
@@ -87,7 +87,8 @@ class _Led(Model):
     def _in_the_middle(cls, data: Any) -> Any:
         if not isinstance(data, dict):
             return data
-        found = {key: _middle(data[line]) for key, line in (("at", "points"), ("to", "goals")) if line in data}
+        lines = {"at": "points", "to": "goals"}
+        found = {key: _middle(data[line]) for key, line in lines.items() if line in data and key in cls.model_fields}
         return {key: place for key, place in found.items() if place is not None} | data
 
     @model_validator(mode="after")
@@ -189,6 +190,12 @@ class RecipeHandle(_Led, Course):
         first = {"rotate": rotate, "scale": scale} if is_first else {}
         return self.model_copy(update={"turned": tuple(sorted([*others, (time, rotate, scale)])), **first})
 
+    def without_turn_key(self, tick: int, dt: float) -> RecipeHandle:
+        """The handle without `turn_key`; one that is then led nowhere waits to be, as one that has just been set."""
+        key = self.turn_key(tick, dt)
+        kept = self.model_copy(update={"turned": tuple(each for each in self.turned if each != key)})
+        return kept if kept.is_led else kept.model_copy(update={"keys": ()})
+
     @property
     def goal(self) -> Point | None:
         """Where it is led in the end; None if nowhere but where it is at its start."""
@@ -227,14 +234,27 @@ class RecipeHandle(_Led, Course):
         return self.model_copy(update={"keys": (*keys, (then, *place))})
 
     def before(self, tick: int, dt: float) -> RecipeHandle | None:
-        """What of it is led before a tick, and stays from then on; None if nothing is."""
+        """What of it is led before a tick, and stays from then on; None if nothing is.
+
+        Between two keys it stays where it has come to. Before the first one it is taken to have set out from `at`.
+        """
         if self.first_tick(dt) >= tick:
             return None
-        mine = self.keys or (), self.turned
-        keys, turned = (tuple(key for key in each if key[0] <= (tick + SAME_TIME) * dt) for each in mine)
+        mine, time = (self.keys or (), self.turned), tick * dt
+        keys, turned = (tuple(key for key in each if key[0] <= time + SAME_TIME * dt) for each in mine)
         if (keys, turned) == mine:
             return self
-        if self.turned and not turned and self.upright == self.start:
+        (x, y), place, part = between(self.to or self.at, self.ready, mine[0], max(time, self.ready), dt)
+        if part and place != (x, y):
+            ways = (np.clip((one, other), 0.0, 1.0).tolist() for one, other in zip((x, y), place, strict=True))
+            across, down = (one + part * (other - one) for one, other in ways)
+            keys = *keys, (time, across, down)
+        first = self.rotate or 0.0, self.scale or 1.0
+        here, there, part = between(first, self.upright, self.turned, max(time, self.upright), dt)
+        if part and there != here:
+            angle, scale = here[0] + part * (there[0] - here[0]), here[1] ** (1 - part) * there[1] ** part
+            turned = *turned, (time, angle, scale)
+        if self.turned and not turned and self.rotate is None and self.scale is None:
             turned = ((self.start, 0.0, 1.0),)  # it is measured as one that is turned
         return self.model_copy(update={"keys": keys, "turned": turned})
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import inf, sqrt
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -40,7 +40,7 @@ from app.progress import Progress
 from app.work.loaded_handles import LoadedHandles
 from app.work.observation import observe
 from app.work.replay import Replay
-from solver.brush.handle import Shape, area
+from solver.brush.handle import Shape
 from solver.components import connected_components
 from solver.gl.device import Device
 from solver.warp.inverse import ForwardMap
@@ -48,7 +48,7 @@ from solver.warp.inverse import ForwardMap
 EVALUATIONS = 32  # replays on the coarse grid
 A_FINE_ONE = 8  # of them for each on the recipe's own
 COARSE_GRID, COARSE_PICTURE, COARSE_DT = 64, 512, 1 / 30
-ALONE = 12  # pairs up to which each handle has values of its own: with more, all have the same
+ALONE = 12  # pairs up to which each handle has values of its own: with more, all change alike
 LEAST_DET = 0.2  # of the map, anywhere
 # What is searched, from and to: radii in longer sides, stiffnesses, durations in parts of the recipe's, viscosities.
 RANGES = (0.06, 0.5), (0.05, 1.0), (0.3, 0.9), (3e-4, 0.3)
@@ -278,7 +278,7 @@ class _Lead:
         swung = np.vdot(arms, ends) / np.vdot(arms, arms).real
         found = float(np.degrees(np.angle(swung)))
         found += 360 * round((angle - found) / 360)
-        grown = sqrt(abs(area(self.ends[1:]) / area(self.begins[1:]))) if self.shape.is_ring else abs(swung)
+        grown = self.shape.grown(self.begins, self.ends) if self.shape.is_ring else abs(swung)
         return (
             _rounded(float(np.clip(found, -MOST_TURNED, MOST_TURNED))),
             _rounded(float(np.clip(grown, LEAST_SCALE, MOST_SCALE))),
@@ -648,7 +648,8 @@ class _Search:
         arrived, off = np.full((len(self.pairs), 2), np.nan), np.full((len(self.pairs), 2), np.nan)
         several = np.split(points, np.cumsum([len(lead.shape.led) for lead in leads])[:-1])
         for number, lead, places in zip(self.numbers, leads, several, strict=True):
-            arrived[number], off[number] = lead.shape.middle(places) / self.extent, lead.off(places)
+            arrived[number] = lead.shape.place(places, lead.begins) / self.extent
+            off[number] = lead.off(places)
         residuals = off[self.hopeful, 1]
         return Trial(recipe, arrived, off[:, 0], residuals, work, found.det_min, found.folds, verdict)
 

@@ -27,7 +27,7 @@ HALTED = {  # why a handle or a pin is not where it is led, by `Handles.halts`
     "waiting": "it has not begun",
     "over": "it has let go by now",
     "under way": "its movement is not over yet",
-    "late": "it is still on its way",
+    "late": "the simulation ends before it arrives",
     None: "that is less than a pixel",
 }
 FAR = "its reach (radius) is too small to go that far"

@@ -6,17 +6,15 @@ Long, as a handle and its shape share what is found out here about lines and out
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from operator import itemgetter
 
 import numpy as np
 
 from solver.brush.tip import FARTHEST, SMALLEST, Point
-from solver.course import SAME_TIME, Course
+from solver.course import Course, between
 from solver.limits import (
     LARGEST_LEAD,
     LEAST_SCALE,
@@ -163,7 +161,7 @@ class Handle(Course):
                 return start
             part, (x, y) = self.passed(time), within(self.to)
             return np.array((x0 + part * x, y0 + part * y))
-        here, there, part = _between((x0, y0) if self.to is None else self.to, self.ready, self.keys, time, dt)
+        here, there, part = between((x0, y0) if self.to is None else self.to, self.ready, self.keys, time, dt)
         x, y = within(here)
         if part == 0:
             return np.array((x0 + x, y0 + y))
@@ -175,7 +173,7 @@ class Handle(Course):
         rotate, scale = self.rotate or 0.0, self.scale or 1.0
         if not self.turned or time < self.upright:
             return math.radians(rotate) * self.passed(time), scale ** self.passed(time)
-        here, there, part = _between((rotate, scale), self.upright, self.turned, time, dt)
+        here, there, part = between((rotate, scale), self.upright, self.turned, time, dt)
         angle = (1 - part) * here[0] + part * there[0]
         return math.radians(angle), here[1] ** (1 - part) * there[1] ** part
 
@@ -272,6 +270,11 @@ class Shape:
         """True if all but the first of its points are a ring."""
         return len(self.led) > 1 and not self.handle.points
 
+    @property
+    def _is_point(self) -> bool:
+        """True if it leads its place alone. Of a line that is one place in the picture, too, but not that of `at`."""
+        return len(self.led) == 1 and not self.handle.points
+
     @cached_property
     def is_in_picture(self) -> bool:
         """True if some of it lies in the picture; of what is all outside nothing is led."""
@@ -284,13 +287,25 @@ class Shape:
             return places[0]
         return places.mean(axis=0) + (self.handle.at - self.led.mean(axis=0))
 
+    def place(self, places: np.ndarray, starts: np.ndarray) -> np.ndarray:
+        """Where `at` of the handle is, (2,), with its points at these places, which were at `starts` when it began.
+
+        Beside the middle of a line it is turned and scaled as that is.
+        """
+        if not self.handle.points:
+            return places[0]
+        (x, y), (now_x, now_y) = ((each - each.mean(axis=0)).T for each in (starts, places))
+        along, across = (x * now_x + y * now_y).sum(), (x * now_y - y * now_x).sum()
+        turn = np.array([[along, across], [-across, along]]) / max(float((x**2 + y**2).sum()), 1e-30)
+        return places.mean(axis=0) + (self.handle.at - self.led.mean(axis=0)) @ turn
+
     def wanted(self, starts: np.ndarray, time: float, dt: float) -> np.ndarray:
         """Where its points shall be at a time, (n, 2), if they were at `starts` when it began; see `Handle.wanted`."""
         handle, middle = self.handle, self.middle(starts)
         there = handle.wanted(middle, time, dt)
         if not handle.points:
             there = np.clip(there, *self.edges(middle))
-        if len(starts) == 1:
+        if self._is_point:
             return there[None]
         there = self._about(there, starts, time, dt)
         way = (np.clip(there, *self.edges(starts)) if handle.points else there) - starts
@@ -328,14 +343,23 @@ class Shape:
         left = places - ends
         if self.is_ring:
             arms = places[1:] - places[0]
-            grown = math.sqrt(abs(area(places[1:]) / (area(ends[1:]) or 1.0)))
-            turned, scaled = float(spun(left[1:] - left[0], arms)), abs(grown - 1) * float(np.hypot(*arms.T).mean())
+            turned = float(spun(left[1:] - left[0], arms))
+            scaled = abs(self.grown(ends, places) - 1) * float(np.hypot(*arms.T).mean())
             return float(np.hypot(*left[0]) + math.hypot(turned, scaled))
         return float(np.hypot(*left.T).max())
 
+    def grown(self, before: np.ndarray, after: np.ndarray) -> float:
+        """How many times as large a ring is at some places as at others, (n, 2) each, by the area within it; or by its
+        arms, where in a corner of the picture only two of its points are, which have none.
+        """
+        if self.around is None:
+            then, now = (float(np.hypot(*(places[1:] - places[0]).T).mean()) for places in (before, after))
+            return now / (then or 1.0)
+        return math.sqrt(abs(area(after[1:]) / (area(before[1:]) or 1.0)))
+
     def _about(self, there: np.ndarray, starts: np.ndarray, time: float, dt: float = 1.0) -> np.ndarray:
         """Its points with the handle at a place, turned as at a time."""
-        if len(starts) == 1:
+        if self._is_point:
             return there[None]
         return np.clip(self.laid(there, starts, time, dt), 0.0, self.extent)
 
@@ -395,23 +419,6 @@ def _crosses_itself(loop: np.ndarray) -> bool:
 
     parted = side_of(loop) * side_of(ends) < 0
     return bool((parted & parted.T).any())
-
-
-def _between(
-    first: Point, since: float, keys: Sequence[tuple[float, float, float]], time: float, dt: float
-) -> tuple[Point, Point, float]:
-    """The last of some keys (t, a, b) that has come, the next, and the part of the way between them, without the times;
-    `first` has come at `since`.
-    """
-    here, number = first, bisect_right(keys, time + SAME_TIME * dt, key=itemgetter(0))
-    if number:
-        since, *_ = keys[number - 1]
-        here = keys[number - 1][1:]
-    # At a key nothing of what comes later is seen.
-    if number == len(keys) or keys[number][0] == since or abs(time - since) <= SAME_TIME * dt:
-        return here, here, 0.0
-    until, *there = keys[number]
-    return here, (there[0], there[1]), (time - since) / (until - since)
 
 
 def _line(corners: Sequence[Point], closed: bool) -> np.ndarray:

@@ -30,7 +30,7 @@ from solver.warp.map import WarpMap
 from solver.warp.strain import Strain
 
 RATE = 8.0  # 1 / s: at which what is left of a way is gone
-# Radii that a handle goes in a tick at most: its push strains what is beside it by up to 7 times as much (H2), and a
+# Radii that a handle goes in a tick at most: its push strains what is beside it by up to 5.4 times as much (H2), and a
 # step of the map follows a strain of 1/2.
 FARTHEST_STEP = 0.07
 # Added to the squares of the influences, which are 1 for a handle by itself: of two that lie on one another nothing
@@ -376,12 +376,17 @@ class Handles:
     @property
     def starts(self) -> np.ndarray:
         """Where they were when they began, (n, 2) in longer sides; NaN where they have not."""
-        return self.middles([self._starts[rows] for rows in self._rows])
+        found = [shape.middle(self._starts[rows]) for shape, rows in zip(self._shapes, self._rows, strict=True)]
+        return np.array(found).reshape(-1, 2)
 
     def middles(self, shapes: list[np.ndarray]) -> np.ndarray:
         """Where they are, (n, 2), with their points at these places; as `shapes`."""
-        middles = [shape.middle(places) for shape, places in zip(self._shapes, shapes, strict=True)]
-        return np.array(middles).reshape(-1, 2)
+        starts = [self._starts[rows] for rows in self._rows]
+        found = [
+            shape.place(here, here if np.isnan(start).any() else start)
+            for shape, here, start in zip(self._shapes, shapes, starts, strict=True)
+        ]
+        return np.array(found).reshape(-1, 2)
 
     @property
     def away(self) -> np.ndarray:

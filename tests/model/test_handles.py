@@ -13,6 +13,7 @@ from app.errors import UserError
 from app.model.handles import LONGEST_LINE, RecipeHandle, RecipePin, heading, labelled, objections
 from app.model.recipe import Recipe
 from app.model.schema import frozen
+from solver.brush.handle import Handle
 
 
 def handle(**keys: Any) -> RecipeHandle:
@@ -94,8 +95,43 @@ def test_what_is_led_before_a_tick() -> None:
     assert [len(cut.keys or ()) for tick in (3, 4, 5) if (cut := led.before(tick, 0.1))] == [1, 2, 2]
     assert led.before(5, 0.1) is led
     turned = handle(start=0.2, turned=[[0.4, 30.0, 1.0], [0.8, 0.0, 1.0]])
-    cuts = [cut.turned for tick in (3, 4, 8) if (cut := turned.before(tick, 0.1))]
-    assert cuts == [((0.2, 0.0, 1.0),), turned.turned[:1], turned.turned]  # one that is turned is measured otherwise
+    cuts = [cut.turned for tick in (4, 8) if (cut := turned.before(tick, 0.1))]
+    assert cuts == [turned.turned[:1], turned.turned]
+    at_first = handle(start=0.2, turned=[[0.4, 0.0, 1.0], [0.8, 30.0, 1.0]])
+    at_once = handle(rotate=90.0, duration=0.0, turned=[[0.4, 90.0, 1.0]])
+    cuts = [cut.turned for led in (at_first, at_once) if (cut := led.before(3, 0.1))]
+    assert cuts == [((0.2, 0.0, 1.0),), ()]  # one that is turned is measured otherwise, unless its first turn says so
+    far = handle(to=None, keys=[[0.0, 0.5, 0.5], [1.0, 1.5, -1.0]])  # to a corner: none is led farther
+    assert [cut.keys for cut in (far.before(5, 0.1),) if cut] == [((0.0, 0.5, 0.5), (0.5, 0.75, 0.25))]
+
+
+@pytest.mark.parametrize("tick", [3, 7, 12, 17, 24])
+@pytest.mark.parametrize(
+    "more",
+    [
+        {"to": [0.5, 0.55], "duration": 0.4, "rotate": 20.0},
+        {"to": None, "scale": 0.5, "duration": 0.4},
+        {"to": None, "keys": [[0.1, 0.45, 0.5], [2.2, 0.52, 0.48]]},
+    ],
+)
+def test_what_is_cut_off_between_two_keys_stays_where_it_has_come_to(more: dict[str, Any], tick: int) -> None:
+    """It was led back to the key before: a stroke that was begun in the middle of a movement undid half of it."""
+    keys = {"keys": [[0.6, 0.55, 0.5], [2.0, 0.6, 0.45]], "turned": [[0.5, 30.0, 1.5], [2.1, -40.0, 0.5]]}
+    led, dt = handle(at=[0.45, 0.5], **keys | more), 0.1
+    cut = led.before(tick, dt)
+    assert cut is not None
+    assert cut.last == pytest.approx(min(max(tick * dt, cut.ready, cut.upright), led.last))
+    names, start = ("at", "to", "radius", "duration", "rotate", "scale", "keys", "turned"), np.array(led.at)
+    whole, part = (Handle(**{name: getattr(each, name) for name in names}) for each in (led, cut))
+    for time in np.arange(0, tick + 0.5, 0.5) * dt:
+        assert part.wanted(start, time, dt) == pytest.approx(whole.wanted(start, time, dt), abs=1e-12)
+        assert part.turn(time, dt) == pytest.approx(whole.turn(time, dt), abs=1e-12)
+
+
+def test_a_pin_that_is_given_goals_is_told_of_them() -> None:
+    """It was told of a key `to` that nobody had written."""
+    with pytest.raises(UserError, match="unknown key 'goals'"):
+        Recipe.parse("[[pin]]\npoints = [[0.1, 0.1], [0.2, 0.2]]\ngoals = [[0.1, 0.1], [0.3, 0.3]]\n")
 
 
 def test_handles_agree_until_one_is_led_elsewhere() -> None:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from solver.brush.handle import Handle
+from solver.brush.handle import Handle, Shape
 
 DT = 0.02
 TIMES = np.linspace(0, 4, 401)
@@ -64,3 +64,28 @@ def test_a_handle_goes_no_farther_than_so_many_radii() -> None:
         far = np.hypot(*way)
         wanted = 0.5 + way * min(1.0, 0.2 / far)
         assert handle.wanted(np.array((0.5, 0.5)), time, DT, 2.0) == pytest.approx(wanted, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("at", "extent"), [((0.01, 0.01), (1.0, 1.0)), ((1.0, 0.99), (1.0, 1.0)), ((0.5, 0.02), (1.0, 0.04))]
+)
+def test_what_is_turned_in_a_corner_is_no_farther_away_than_it_is(at: tuple[float, float], extent: tuple[float, float]):
+    """Two points of its ring lie in the picture, which have no area: it was a radius / 4 away for ever."""
+    shape = Shape.of(Handle(at, radius=0.25, rotate=0.0), extent)
+    assert len(shape.led) == 3
+    assert shape.away(shape.led, shape.due(shape.led, 0.0, DT)) == pytest.approx(0, abs=1e-12)
+    wider = shape.led[0] + 1.1 * (shape.led - shape.led[0])
+    assert shape.away(wider, shape.led) == pytest.approx(0.1 * 1.1 * 0.25 / 4, rel=1e-6)
+    assert shape.grown(shape.led, wider) == pytest.approx(1.1)
+
+
+@pytest.mark.parametrize("goals", [(), ((-0.5, 0.6), (0.02, 0.6))])
+def test_a_line_of_which_one_point_is_in_the_picture_leads_that_to_its_own_place(goals: tuple):
+    """It was led where the middle of the line was to be, outside: a pin drew the picture out to its edge."""
+    handle = Handle((-0.24, 0.5), points=((-0.5, 0.5), (0.02, 0.5)), goals=goals)
+    shape = Shape.of(handle, (1.0, 1.0))
+    assert shape.led == pytest.approx(np.array([(0.02, 0.5)]))
+    there = np.array([goals[1] if goals else (0.02, 0.5)])
+    assert shape.wanted(shape.led, handle.last, DT) == pytest.approx(there)
+    assert shape.due(shape.led, handle.last, DT) == pytest.approx(there)
+    assert shape.short_of_edges(shape.led) == pytest.approx(0)

@@ -14,11 +14,12 @@ import pytest
 from app.errors import UserError
 from app.media import project as projects
 from app.media.pictures import read_picture
-from app.model.handles import ARRIVED, MOST_HANDLES, MOST_LINES
+from app.model.handles import ARRIVED, MOST_HANDLES, MOST_LINES, RecipeHandle
 from app.model.recipe import Recipe
 from app.model.windows import with_detail
 from app.progress import Progress
 from app.ui.events import LEFT, Button, Event, Mods, Move
+from app.ui.panels.inspector import whereabouts
 from app.ui.theme import packed
 from app.ui.widgets import Ui
 from app.work import journal
@@ -185,6 +186,49 @@ def test_a_keyframe_does_not_keep_a_turn_from_being_changed_while_it_is_made(rob
     assert (handle.rotate, handle.turned) == (60.0, ((pytest.approx(1.0), 60.0, 1.0),))
     widgets.click("Remove this keyframe")
     assert session.recipe.handle[0].turned == ()
+
+
+def test_the_last_keyframe_is_removed_from_a_handle_that_only_turns(robot: Robot, widgets: Widgets) -> None:
+    """What was saved then could not be opened any more: a handle without `to` or keys."""
+    session = robot.editor.session
+    handle = RecipeHandle(at=(0.4, 0.5), turned=((0.1, 20.0, 1.0),))
+    session.edit("Handle", handle=(handle,), duration=0.1)
+    session.seek(session.end)
+    robot.editor.state.selected = "handle[1]"
+    robot.rest()
+    widgets.click("Remove this keyframe")
+    assert Recipe.parse(session.recipe.text()).handle == (handle.edited(turned=(), keys=()),)
+
+
+def test_what_a_turned_line_lacks_is_told_of_what_is_farthest_of_it(robot: Robot) -> None:
+    """It said "moves 66 px, 77 px left": the one of its middle, the other of an end."""
+    session = robot.editor.session
+    line = ((0.3, 0.5), (0.6, 0.5))
+    lines = {
+        "moves 12 px, up to": RecipeHandle(at=(0.45, 0.5), points=line, to=(0.5, 0.5), rotate=90.0, end=0.1),
+        "turned, up to": RecipeHandle(at=(0.45, 0.5), points=line, rotate=90.0, end=0.1),
+        "bent, up to": RecipeHandle(at=(0.45, 0.5), points=line, goals=((0.3, 0.4), (0.6, 0.6)), to=(0.45, 0.5)),
+        "stays": RecipeHandle(at=(0.45, 0.5), points=line, keys=()),
+        "moves 12 px, ": RecipeHandle(at=(0.45, 0.5), to=(0.5, 0.5)),
+    }
+    for told, handle in lines.items():
+        session.edit("Handle", handle=(handle,), duration=0.05)
+        session.seek(session.end)
+        robot.rest()
+        found = whereabouts(robot.editor.workspace, "handle[1]", handle)
+        assert found.startswith(told)
+        assert ("up to" in found) == ("up to" in told)
+
+
+def test_after_undo_nothing_is_said_to_be_on_its_way_though_time_stands_still(robot: Robot) -> None:
+    robot.drag((0.3, 0.3), (0.42, 0.3), steps=6)
+    robot.drag((0.7, 0.7), (0.6, 0.7), steps=6)
+    session = robot.editor.session
+    session.undo()
+    robot.rest()
+    assert not session.is_moving
+    (unmet,) = session.unmet.values()
+    assert unmet.said.endswith(": the simulation ends before it arrives")
 
 
 def test_a_turn_that_would_end_later_than_a_recipe_may_is_refused(robot: Robot) -> None:

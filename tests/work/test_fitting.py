@@ -343,6 +343,15 @@ def test_what_is_turned_by_more_than_half_a_turn_goes_the_same_way_round(way: in
     assert turned * way > 0
 
 
+def test_what_is_turned_in_a_corner_that_has_been_moved_is_fitted(device: Device, tmp_path: Path):
+    """Two places of its ring are in the picture, of which the area was asked: the fit ended in a division by zero."""
+    write_map(tmp_path / "m.npy", Displacement(np.full((48, 64, 2), (-0.03, 0.0), np.float32)))
+    turned = "[[handle]]\nat = [0.01, 0.01]\nkeys = []\nturned = [[0.3, 20.0, 1.0]]\n"
+    (handle,) = fit(device, None, 1, f'map = "{tmp_path}/m.npy"\n{FREE}{turned}').trial.recipe.handle
+    assert handle.scale == pytest.approx(1.0, abs=0.05)
+    assert handle.rotate in (20.0, 10.0, 5.0)  # less of the way where the map that it begins with folds
+
+
 def test_a_handle_that_has_let_go_before_the_end_is_left_as_it_is(device: Device):
     gone = "[[handle]]\nat = [0.2, 0.5]\nto = [0.25, 0.5]\nduration = 0.1\nend = 0.2\n"
     led = "[[handle]]\nat = [0.6, 0.5]\nto = [0.6, 0.44]\nstart = 0.3\nduration = 0.2\n"

@@ -132,6 +132,14 @@ def test_a_line_is_moved_as_one_and_turned(device: Device):
     assert warp.statistics().folds == 0
 
 
+def test_a_line_that_is_turned_about_its_end_is_where_that_is(device: Device):
+    """It was told to be as far beside its middle as at first, whichever way it had been turned."""
+    line = ((0.4, 0.5), (0.6, 0.5))
+    led, _ = led_alone(device, Handle(line[0], rotate=60.0, duration=0.5, points=line), ticks=40, cells=48)
+    assert led.away[0] < ARRIVED
+    assert led.places[0] == pytest.approx(line[0], abs=ARRIVED)
+
+
 def test_an_outline_goes_into_another_form_and_size(device: Device):
     square = ((0.4, 0.4), (0.6, 0.4), (0.6, 0.6), (0.4, 0.6))
     goals = ((0.4, 0.4), (0.7, 0.38), (0.68, 0.62), (0.4, 0.66))

@@ -174,7 +174,7 @@ def _handles(ui: Ui, workspace: Workspace, state: EditorState, do: Do) -> None:
     else:
         ui.text(heading(label), size=14)
         imgui.same_line()
-        ui.dim(_whereabouts(workspace, label, led))
+        ui.dim(whereabouts(workspace, label, led))
         slid = ui.slider(
             "held radius", "Size", led.radius, SMALLEST, 1.0, pixels, 0.15, logarithmic=True,
             title="How far across it reaches", more="It goes at most that far.",
@@ -228,11 +228,11 @@ def _turn(ui: Ui, session: Session, label: str, led: RecipeHandle) -> None:
     slid = ui.slider("held scale", "Scale", scale, 0.25, 4.0, PERCENT, 1.0, logarithmic=True, title="Scale", more=when)
     turned = _turned(led.turned_to(tick, dt, rotate, slid.value)) if led.turned else {"scale": slid.value}
     _set_held(session, label, f"Scale of a {led.kind}", slid, **turned)
-    keyed = led.turned_to(tick, dt, rotate, scale).turned
-    is_key = keyed == led.turned
+    keyed = led.turned_to(tick, dt, rotate, scale)
+    is_key = keyed.turned == led.turned
     if ui.button("Remove this keyframe" if is_key else "Add a keyframe here", width=-1, height=30):
-        kept = tuple(key for key in led.turned if key != led.turn_key(tick, dt)) if is_key else keyed
-        session.edit_held(f"Keyframe of a {led.kind}", label, turned=kept)
+        changed = led.without_turn_key(tick, dt) if is_key else keyed
+        session.edit_held(f"Keyframe of a {led.kind}", label, keys=changed.keys, turned=changed.turned)
     more = "Rotate and Scale are kept until here; where you change them at another time, a keyframe is added."
     where = "where its first turn ends" if is_early else "at the playhead"
     ui.tooltip(f"A keyframe of Rotate and Scale {where}", more=more)
@@ -242,16 +242,20 @@ def _turned(led: RecipeHandle) -> dict[str, Any]:
     return {"rotate": led.rotate, "scale": led.scale, "turned": led.turned}
 
 
-def _whereabouts(workspace: Workspace, label: str, led: RecipeHandle | RecipePin) -> str:
-    """How far the handle that is called so is led, and what is left of that, in pixels; or why it does nothing."""
+def whereabouts(workspace: Workspace, label: str, led: RecipeHandle | RecipePin) -> str:
+    """How far the middle of the handle that is called so is led, and how far what is farthest of it has still to go, in
+    pixels; or why it does nothing.
+    """
     session, pixels = workspace.session, max(workspace.canvas.size)
     for held in session.held:
         if held.label == label:
             way = hypot(*np.subtract(held.start, held.target) * session.extent)
-            rest = f", {pixels * held.left:.0f} px left" if held.is_away else ""
-            if way > 1e-9:
+            turns, bends = (led.turns, bool(led.goals)) if isinstance(led, RecipeHandle) else (False, False)
+            at_most = "up to " * (turns or bends)
+            rest = f", {at_most}{pixels * held.left:.0f} px left" if held.is_away else ""
+            if pixels * way >= 0.5:  # less would be told as 0
                 return f"moves {pixels * way:.0f} px{rest}"
-            return f"{'turned' if isinstance(led, RecipeHandle) and led.turns else 'stays'}{rest}"
+            return f"{'turned' if turns else 'bent' if bends else 'stays'}{rest}"
     return "muted" if led.muted else "not at work at this moment"
 
 
