@@ -17,7 +17,7 @@ from app.media.animation import animation_writer
 from app.media.pictures import write_picture
 from app.media.project import from_picture
 from app.model.bars import Which
-from app.model.handles import RecipeHandle, RecipePin
+from app.model.handles import RecipeHandle, RecipePin, labelled
 from app.model.recipe import Recipe
 from app.model.strokes import Stroke, ToolName
 from app.model.tools import TOOLS
@@ -341,3 +341,20 @@ def _is_twice(line: str, other: str) -> bool:
 def _without_numbers(found: re.Match[str]) -> str:
     """Words as they are on any machine, at any size of the picture."""
     return re.sub(r"\d[\d.]*", "0", found[0])
+
+
+def test_how_far_a_handle_with_a_name_goes_is_told_below_it(
+    device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Beside the name there was no room for "up to 60 px left"."""
+    ends = (0.3, 0.5), (0.6, 0.5)
+    line = RecipeHandle(name="a sleeve", at=(0.45, 0.5), points=ends, to=(0.5, 0.5), rotate=90.0, end=0.1)
+    laid = Laid(monkeypatch)
+    with Robot(device, small_project(tmp_path), SIZES[1], preferences=Preferences(auto_quality=False)) as robot:
+        session, state = robot.editor.session, robot.editor.state
+        session.edit("Handle", handle=(line,), duration=0.05)
+        session.seek(session.end)
+        state.choose_tool("handle", False)
+        ((state.selected, _),) = labelled((line,), ())
+        robot.rest()
+        assert laid.faults(robot.frame) == []

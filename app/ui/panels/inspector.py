@@ -174,7 +174,10 @@ def _handles(ui: Ui, workspace: Workspace, state: EditorState, do: Do) -> None:
     else:
         ui.text(heading(label), size=14)
         imgui.same_line()
-        ui.dim(whereabouts(workspace, label, led))
+        words = whereabouts(workspace, label, led)
+        if imgui.calc_text_size(words).x > imgui.get_content_region_avail().x:
+            imgui.new_line()
+        ui.dim(words)
         slid = ui.slider(
             "held radius", "Size", led.radius, SMALLEST, 1.0, pixels, 0.15, logarithmic=True,
             title="How far across it reaches", more="It goes at most that far.",
