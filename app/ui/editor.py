@@ -116,7 +116,7 @@ class Editor:
         self._styled: tuple[object, ...] = ()
         self._once_typed: list[str] = []  # actions that wait until what is being typed has been taken
         self._later: list[Event] = []  # what the next frame hears first
-        self._clicked = False  # off the canvas, and imgui has not taken it up
+        self._clicked = self._typed = False  # off the canvas, and into a field: imgui has not taken it up
         self._known = TOLD  # frames for which it has been known whether text is being typed
         self.open(project)
 
@@ -250,12 +250,13 @@ class Editor:
     def _heard(self, events: Sequence[Event]) -> list[Event]:
         """What this frame hears: keys and presses on the canvas wait, with what comes after them, for imgui.
 
-        A key waits until imgui can tell whether it is text, and both until what was clicked on before has acted: on a
-        slow machine a click into a field, what is typed there, and the key of an action come all at once, and so do the
-        click on a tool and the stroke that is drawn with it.
+        A key waits until imgui can tell whether it is text; both until what was clicked on before has acted; presses
+        until what was typed before has. On a slow machine a click into a field, what is typed there, and the key of an
+        action come all at once, and so do the click on a tool, a size for it, and the stroke that is drawn with it.
         """
         heard, self._later = [*self._later, *events], []
         self._clicked &= self.backend.is_behind
+        self._typed &= self.backend.is_behind
         at = self.pointer.x, self.pointer.y
         for number, event in enumerate(heard):
             match event:
@@ -264,7 +265,7 @@ class Editor:
                 case Text() | Key(down=True) if self._known < TOLD or self._clicked:
                     heard, self._later = heard[:number], heard[number:]
                     break
-                case Button(down=True) if self._clicked and self.pointer.reaches_canvas(*at):
+                case Button(down=True) if (self._clicked or self._typed) and self.pointer.reaches_canvas(*at):
                     heard, self._later = heard[:number], heard[number:]
                     break
                 case Button(down=down):
@@ -275,6 +276,7 @@ class Editor:
                     self._known = 0
                 case Key(key, True, mods) if self.backend.is_typing and self._leaves_a_field(mods.chord(key)):
                     self._known = 0
+            self._typed |= self.backend.is_typing and isinstance(event, Text | Key)
         if not self.backend.is_behind:  # else it has not yet taken up the click
             self._known += 1
         return heard

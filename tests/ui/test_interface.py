@@ -294,6 +294,25 @@ def test_a_stroke_that_comes_together_with_the_click_on_its_tool_is_drawn_with_i
     assert [made.tool for made in robot.editor.session.recipe.stroke] == ["push"]
 
 
+@pytest.mark.parametrize("together", [True, False], ids=["at once", "typed before"])
+def test_a_stroke_that_comes_together_with_a_number_for_its_brush_has_that(robot: Robot, together: bool) -> None:
+    """Also if the number came some frames before, as each of its letters takes one."""
+    start, end = robot.at(0.4, 0.5), robot.at(0.6, 0.5)
+    ctrl_click(robot, 300, 24)
+    robot.frame(count=5)
+    typed = [event for letter in "12" for event in (Key(letter, True), Text(letter), Key(letter, False))]
+    typed += [Key("enter", True), Key("enter", False)]
+    stroke = [Move(*start), Button(LEFT, True), Move(*end), Button(LEFT, False)]
+    if together:
+        robot.frame(*typed, *stroke, dt=0.5)
+    else:
+        robot.frame(*typed, dt=0.5)
+        robot.frame(*stroke, dt=0.5)
+    robot.frame(count=30)
+    (made,) = robot.editor.session.recipe.stroke
+    assert made.radius == pytest.approx(12 / 2 / max(robot.editor.view.picture))
+
+
 @pytest.mark.parametrize("key", ["tab", "escape", "enter"])
 def test_nothing_waits_for_the_repeats_of_a_key_that_was_held(robot: Robot, key: str) -> None:
     robot.frame(Key(key, True))
