@@ -98,7 +98,8 @@ def animation_writer(
         cancel: asked with each frame, and ten times a second while the encoder keeps us waiting; true raises
             `Cancelled`.
         passed: hears of frames that a later pass has gone through, after all were given, in formats with `passes`.
-        written: hears of each file of a sequence, by its number; see `sequence_writer`.
+        written: hears of each file of a sequence, by its number, see `sequence_writer`; of another file as of number 0,
+            just before it appears.
     """
     check_animation(path, fps / min(options.durations or [1]), options.codec)
     like, quality = options.like, 95 if options.quality is None else options.quality
@@ -121,7 +122,7 @@ def animation_writer(
     container = ANIMATIONS[Path(path).suffix.lower()]
     rate = Fraction(fps).limit_denominator(100_000)
     with ExitStack() as stack:
-        temporary = stack.enter_context(replacing(path))
+        temporary = stack.enter_context(replacing(path, whole=partial(written, 0)))
         if container.name == "GIF":
             with _gif_writer(temporary, str(path), rate, options, cancel, passed) as write:
                 yield lambda frame, number=None: write(straight(frame))
