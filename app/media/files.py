@@ -398,9 +398,8 @@ def noticing(path: str | os.PathLike[str], notice: Callable[[str], object]) -> C
 
     def look(file: Path) -> None:
         if state_of(path) not in (None, before):
-            notice(
-                f"{Path(path).name}: another program wrote this file while it was being made; what that wrote is replaced"
-            )
+            told = "another program wrote this file while it was being made; what that wrote is replaced"
+            notice(f"{Path(path).name}: {told}")
 
     return look
 
