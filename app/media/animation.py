@@ -278,8 +278,9 @@ def _sound(
     length = [] if how.frames is None else ["-t", f"{float(how.frames / rate):.6f}"]
     options = ["-map_chapters", "-1"]  # which belong to all of it: that they are not kept is told
     for number, (place, track) in enumerate(tracks):
-        # What is copied would else begin where the file can be sought to, and hold the first frame back until then.
-        chosen = ("-c", "copy", "-copypriorss", "0") if track.codec in container.sound else container.encoder
+        # Of a part, what is copied would else begin where the file can be sought to, and hold the first frame back.
+        prior = "1" if track.codec in container.ahead and not begin else "0"
+        chosen = ("-c", "copy", "-copypriorss", prior) if track.codec in container.sound else container.encoder
         options += ["-map", f"1:a:{place}"]
         named = {"title": track.name, "language": (container.languages or {}).get(track.language)}
         for name, value in named.items():
