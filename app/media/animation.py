@@ -98,7 +98,8 @@ def animation_writer(
         cancel: asked with each frame, and ten times a second while the encoder keeps us waiting; true raises
             `Cancelled`.
         passed: hears of frames that a later pass has gone through, after all were given, in formats with `passes`.
-        written: hears of each file of a sequence, by its number; see `sequence_writer`.
+        written: hears of each file of a sequence, by its number, see `sequence_writer`; of another file as of number 0,
+            just before it appears.
     """
     check_animation(path, fps / min(options.durations or [1]), options.codec)
     like, quality = options.like, 95 if options.quality is None else options.quality
@@ -121,7 +122,7 @@ def animation_writer(
     container = ANIMATIONS[Path(path).suffix.lower()]
     rate = Fraction(fps).limit_denominator(100_000)
     with ExitStack() as stack:
-        temporary = stack.enter_context(replacing(path))
+        temporary = stack.enter_context(replacing(path, whole=partial(written, 0)))
         if container.name == "GIF":
             with _gif_writer(temporary, str(path), rate, options, cancel, passed) as write:
                 yield lambda frame, number=None: write(straight(frame))
@@ -277,8 +278,9 @@ def _sound(
     length = [] if how.frames is None else ["-t", f"{float(how.frames / rate):.6f}"]
     options = ["-map_chapters", "-1"]  # which belong to all of it: that they are not kept is told
     for number, (place, track) in enumerate(tracks):
-        # What is copied would else begin where the file can be sought to, and hold the first frame back until then.
-        chosen = ("-c", "copy", "-copypriorss", "0") if track.codec in container.sound else container.encoder
+        # Of a part, what is copied would else begin where the file can be sought to, and hold the first frame back.
+        prior = "1" if track.codec in container.ahead and not begin else "0"
+        chosen = ("-c", "copy", "-copypriorss", prior) if track.codec in container.sound else container.encoder
         options += ["-map", f"1:a:{place}"]
         named = {"title": track.name, "language": (container.languages or {}).get(track.language)}
         for name, value in named.items():

@@ -137,8 +137,9 @@ class Container:
 
     The first codec is what it gets where none is asked for. `sound` names the codecs taken over as they are; any other
     is turned into the first one, by the options `encoder`, in pairs, for the `layouts` of loudspeakers that it has;
-    None: all. `roles` is what sound can be marked as, `languages` what it calls each of those that it knows; None: it
-    knows all, as ISO 639-2 calls them.
+    None: all. `ahead` names those whose first packet may begin before the pictures, as decoders need. `roles` is what
+    sound can be marked as, `languages` what it calls each of those that it knows; None: it knows all, as ISO 639-2
+    calls them.
     """
 
     name: str
@@ -147,6 +148,7 @@ class Container:
     sound: tuple[str, ...] = ()
     encoder: tuple[str, ...] = ()
     layouts: tuple[str, ...] | None = None
+    ahead: tuple[str, ...] = ()
     roles: tuple[str, ...] = ()
     languages: Mapping[str, str] | None = None
     passes: int = 1
@@ -189,6 +191,7 @@ ANIMATIONS = {
         {"h264": _mp4, "h265": _h265},
         even=True,
         sound=("aac", "mp3", "ac3"),
+        ahead=("aac", "mp3", "ac3"),
         encoder=("-c", "aac", "-b", "192k"),
         roles=(*ROLES, "captions", "descriptions"),
     ),
@@ -197,6 +200,7 @@ ANIMATIONS = {
         {"vp9": _webm, "av1": _av1},
         even=True,
         sound=("opus", "vorbis"),
+        ahead=("opus", "vorbis"),
         encoder=("-c", "libopus", "-b", "128k", "-filter", f"aformat=channel_layouts={'|'.join(LAYOUTS)}"),
         layouts=LAYOUTS,
         roles=("forced",),
@@ -205,6 +209,7 @@ ANIMATIONS = {
         "FFV1",
         {"ffv1": lossless},
         sound=("flac", "aac", "mp3", "ac3", "opus", "vorbis"),
+        ahead=("ac3", "opus", "vorbis"),  # of AAC and MP3 it would hold the first frame back by a packet
         encoder=("-c", "flac"),
         layouts=LAYOUTS,
         roles=(*ROLES, "original"),
@@ -215,6 +220,7 @@ ANIMATIONS = {
         even=True,
         languages=MAC_NAMES,
         sound=("pcm_s16le", "pcm_s24le", "aac"),
+        ahead=("aac",),
         encoder=("-c", "pcm_s16le"),
     ),
     ".gif": Container("GIF", {"gif": lossless}, passes=2),  # by way of a lossless file, see `animation_writer`

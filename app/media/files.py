@@ -15,7 +15,7 @@ from itertools import pairwise, product
 from pathlib import Path
 
 from app.errors import UserError
-from app.media.inputs import cannot_read, no_name
+from app.media.inputs import cannot_read, no_name, state_of
 from app.media.leftovers import sweep, temporary_name
 from app.progress import if_abandoned
 
@@ -390,6 +390,18 @@ def replacing(
         if target.parent.is_dir():
             raise
         raise cannot_write(path, FileNotFoundError(errno.ENOENT, "")) from None
+
+
+def noticing(path: str | os.PathLike[str], notice: Callable[[str], object]) -> Callable[[Path], None]:
+    """Make the `whole` of `replacing` that tells `notice` if another program has written `path` since now."""
+    before = state_of(path)
+
+    def look(file: Path) -> None:
+        if state_of(path) not in (None, before):
+            told = "another program wrote this file while it was being made; what that wrote is replaced"
+            notice(f"{Path(path).name}: {told}")
+
+    return look
 
 
 def _hand_over(path: Path, status: os.stat_result) -> None:

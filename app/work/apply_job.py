@@ -17,7 +17,7 @@ from app.media.animation import Frame, animation_writer
 from app.media.clip import WHOLE, rate_of
 from app.media.displacement import Displacement, PixelPlaces, cropped, folds
 from app.media.encoders import check_colours, check_colours_of_picture, check_output, passes, unheld_of_clip
-from app.media.files import check_kept, check_numbers, is_sequence, numbered_files, stands_for_files, writable
+from app.media.files import check_kept, check_numbers, is_sequence, noticing, numbered_files, stands_for_files, writable
 from app.media.formats import picture_format
 from app.media.holding import Losses, Written
 from app.media.inputs import MAX_PIXELS
@@ -26,7 +26,7 @@ from app.media.record import Record, digest_of, digest_of_file
 from app.media.source import Source, open_source
 from app.model.picture import Picture
 from app.progress import Progress
-from app.work.export import Kept, Report, Target, steps_for, write_all
+from app.work.export import Kept, Report, Target, noting, steps_for, write_all
 from app.work.jobs import check_result, longer_side
 from app.work.layers import resample_layers
 from app.work.map_sampler import MapSampler, inverted
@@ -146,6 +146,7 @@ class _Applying:
         self.outputs, self.output = order.outputs, order._output
         self.size = order._size(source.picture)
         self.notices = [source.picture.note]
+        self._whole = noticing(self.output, self.notices.append)
         self._files = order.maps.files()
         self._read: tuple[Path, Displacement] | None = None
 
@@ -172,7 +173,7 @@ class _Applying:
         self.progress.enter("")
         warped = self._warped(given, picture, lambda height: self.progress.parts(steps, height), alpha=True)
         self.progress.enter("writing")
-        self.outputs.write(warped, self.order.quality)
+        self.outputs.write(warped, self.order.quality, self._whole)
         self.progress.count(steps)
         return 1
 
@@ -257,7 +258,7 @@ class _Applying:
                 outputs.animation(first, rate, order.quality, self.source.picture, clip),
                 cancel=progress.cancel,
                 passed=progress.advance,
-                written=record.add if record else lambda number, file: None,
+                written=noting({self.output: record} if record else {}, self.output, self._whole),
             )
             written = write_all(((n, self._frame(n, one, is_own)) for n, one in pictures), writer, progress)
         progress.expect(-kept.count)

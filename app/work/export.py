@@ -25,7 +25,7 @@ from app.media.clip import frame_of
 from app.media.depth import mixed
 from app.media.displacement import Displacement
 from app.media.encoders import passes, unheld_of_clip
-from app.media.files import is_sequence, replacing, telling
+from app.media.files import is_sequence, noticing, replacing, telling
 from app.media.formats import picture_format
 from app.media.holding import Losses, Written
 from app.media.maps import map_writer, write_map
@@ -109,6 +109,7 @@ class _Export:
         like = job.picture if job.frame is None else frame_of(*job.frame)
         self.like = replace(like, premultiplied=False) if job.recipe.mode == "density" else like
         self.written: list[Path] = []
+        self.whole = {path: noticing(path, self.pictures.notice) for path in self.outputs.files}
         self.sentinel = Sentinel(job.recipe.stop, job.recipe.fluid.dt)
         self.losses = Losses(self.outputs.file, self._written) if self.outputs.file is not None else None
         self.numbers: list[dict[str, Any]] = []
@@ -145,7 +146,7 @@ class _Export:
                 self._look(self.like)
                 picture = self._still(self.like, lambda height: self.progress.parts(steps, height))
                 self.progress.enter("writing")
-                outputs.write(picture, recipe.output.quality)
+                outputs.write(picture, recipe.output.quality, self.whole[outputs.file])
                 self.written.append(outputs.file)
                 self.progress.count(steps)
             self._note(0, Fraction(end))
@@ -162,11 +163,11 @@ class _Export:
                 ) from None
             self.progress.advance(steps_for((found.width, found.height)))
             self.progress.enter("writing the map")
-            write_map(outputs.maps.path, found, outputs.maps.kind)
+            write_map(outputs.maps.path, found, outputs.maps.kind, self.whole[outputs.maps.path])
             self.written.append(outputs.maps.path)
             self.progress.count(steps_for((found.width, found.height)))
         if outputs.stats is not None:
-            with replacing(outputs.stats) as temporary:
+            with replacing(outputs.stats, whole=self.whole[outputs.stats]) as temporary:
                 temporary.write_text(json.dumps(self._document(verdict), indent=1) + "\n", "utf-8")
         if self.states is not None:
             self.states.keep(last=True)  # where the next part begins
@@ -227,7 +228,7 @@ class _Export:
         with ExitStack() as stack:
             take_map = None
             if maps is not None and maps.is_sequence:
-                cancel, note = self.progress.cancel, noting(records, maps.path)
+                cancel, note = self.progress.cancel, noting(records, maps.path, self.whole[maps.path])
                 writer = map_writer(maps.path, maps.kind, cancel=cancel, written=note, resumed=self.outputs.resume)
                 take_map = stack.enter_context(in_order(stack.enter_context(writer)))
             kept = Kept(records.values() if self.outputs.resume else [])
@@ -307,7 +308,7 @@ class _Export:
             self.outputs.animation(first, job.rate, self.recipe.output.quality, self.like, job.clip),
             cancel=self.progress.cancel,
             passed=self.progress.advance,
-            written=noting(records, file),
+            written=noting(records, file, self.whole[file]),
         )
 
     def _frames(
@@ -498,9 +499,9 @@ class _Export:
         }
 
 
-def noting(records: dict[Path, Record], path: Path) -> Callable[[int, Path], None]:
-    """What hears of each frame that is written of a sequence: its record, if it has one."""
-    return records[path].add if path in records else lambda number, file: None
+def noting(records: dict[Path, Record], path: Path, whole: Callable[[Path], None]) -> Callable[[int, Path], None]:
+    """What hears of each file of an animation: the record of its sequence, if it has one, or `whole`."""
+    return records[path].add if path in records else lambda number, file: whole(file)
 
 
 class Kept:

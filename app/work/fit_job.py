@@ -11,7 +11,7 @@ import numpy as np
 
 from app.errors import UserError
 from app.media.clip import Clip
-from app.media.files import check_kept, in_text, name_from, replacing, telling, writable
+from app.media.files import check_kept, in_text, name_from, noticing, replacing, telling, writable
 from app.media.landmarks import Pairs, check_ending, read_pairs, write_pairs
 from app.media.opening import Opened, check_picture
 from app.media.outlines import read_outlines
@@ -112,13 +112,15 @@ class FitJob:
         pairs, notices = pairs_in(self.pairs, self.masks, size)
         how = self.evaluations, self.local, source.clip, found.label
         fit = Fit(self._placed(found), picture, found.folder, pairs, *how)
+        told: list[str] = []
+        whole = noticing(self.output, told.append)
         done = fit.perform(device, progress)
-        with replacing(self.output) as temporary:
+        with replacing(self.output, whole=whole) as temporary:
             temporary.write_text(done.trial.recipe.text(), encoding="utf-8")
         if self.arrived is not None:
             with telling([self.output]):
                 write_pairs(self.arrived, done.pairs, size)
-        return replace(done, notices=(*notices, *done.notices))
+        return replace(done, notices=(*notices, *done.notices, *told))
 
     def _placed(self, found: Opened) -> Recipe:
         """The recipe with its picture named from where it is written."""

@@ -115,12 +115,13 @@ class Outputs:
         if picture_format(self.file).name == "JPEG" and not isclose(held_dpi((self.dpi, self.dpi))[0], self.dpi):
             raise UserError(f"JPEG holds whole dots per inch, not {self.dpi:g}; round --dpi, or write a PNG or TIFF")
 
-    def write(self, picture: Picture, quality: int) -> None:
+    def write(self, picture: Picture, quality: int, whole: Callable[[Path], None]) -> None:
         """Write a picture to `file` as is asked for; see `write_picture`."""
         assert self.file is not None
         write_picture(
-            self.file, picture, bits=self.bits, quality=quality, strip=self.strip, codec=self.codec, dpi=self.dpi
-        )
+            self.file, picture, bits=self.bits, quality=quality, strip=self.strip, codec=self.codec, dpi=self.dpi,
+            whole=whole,
+        )  # fmt: skip
 
     def animation(
         self, first: int, rate: Fraction, quality: int | None, like: Picture, clip: Clip | None

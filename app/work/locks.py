@@ -35,7 +35,11 @@ class Lock:
         Raises:
             OSError: if it cannot be made, is a link, or there are no locks on this disk.
         """
-        handle = os.open(path, os.O_RDWR | os.O_CREAT | NO_LINK, 0o600)  # closed in every process that this one starts
+        try:
+            # closed in every process that this one starts
+            handle = os.open(path, os.O_RDWR | os.O_CREAT | NO_LINK, 0o600)
+        except FileNotFoundError:  # with its folder
+            return None
         try:
             try_lock(handle)
             held = cls(handle)

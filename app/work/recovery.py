@@ -78,13 +78,16 @@ class LockedFolder:
 
     def discard(self) -> None:
         """Remove it; what is left of it if that fails half-way is no journal any more."""
-        for name in (JOURNAL, NEW):
+        # The lock goes while it is held: whoever takes one from then on has made it anew, and keeps it.
+        for name in (JOURNAL, NEW, LOCK):
             with suppress(OSError):
                 (self.folder / name).unlink()
         self.lock.release()
+        if os.name == "nt":  # where what is open cannot be removed
+            with suppress(OSError):
+                (self.folder / LOCK).unlink()
         # What anybody else has put there stays there.
         with suppress(OSError):
-            (self.folder / LOCK).unlink()
             self.folder.rmdir()
 
 

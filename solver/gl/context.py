@@ -9,7 +9,7 @@ import sys
 import threading
 from collections import defaultdict
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
@@ -35,6 +35,19 @@ class NoSuchDevice(ContextError):
         numbers = "none" if there == 0 else "only 0" if there == 1 else f"0 to {there - 1}"
         super().__init__(f"graphics device {asked} is not there; there is {numbers}")
         self.there = there
+
+
+@contextmanager
+def making() -> Iterator[None]:
+    """Make objects of GL in the block. Raises `ContextError` where the driver gives none: it was reset, or crashed."""
+    try:
+        yield
+    except moderngl.Error as error:
+        if not str(error).startswith("cannot create"):
+            raise
+        raise ContextError(
+            "the graphics driver has stopped working; start fluidwarp again; if it happens again, update the driver"
+        ) from error
 
 
 @dataclass(frozen=True)
@@ -164,7 +177,8 @@ class Context:
         """The framebuffer that draws into several textures at once, kept until one of them is released."""
         target = self._targets.get(textures)
         if target is None:
-            target = self._targets[textures] = self.ctx.framebuffer(textures)
+            with making():
+                target = self._targets[textures] = self.ctx.framebuffer(textures)
             for texture in textures:
                 self._targets_of[texture].add(textures)
         return target

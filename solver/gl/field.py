@@ -9,7 +9,7 @@ from typing import Any
 import moderngl
 import numpy as np
 
-from solver.gl.context import Context
+from solver.gl.context import Context, making
 
 DTYPES = {"f1": np.uint8, "nu2": np.uint16, "u4": np.uint32, "f2": np.float16, "f4": np.float32}
 
@@ -80,7 +80,8 @@ class Field:
             raise FieldError(f"{self.label} was released")
         self.device.use()
         # Not one of `device.framebuffer`, which would keep the texture of a field that is dropped and not released.
-        self.framebuffer = framebuffer = self.device.ctx.framebuffer([self.texture])
+        with making():
+            self.framebuffer = framebuffer = self.device.ctx.framebuffer([self.texture])
         framebuffer.label = self.label
         return framebuffer
 
@@ -194,9 +195,10 @@ def numbers_in(label: str, values: object) -> np.ndarray:
 
 
 def new_texture(ctx: moderngl.Context, size: tuple[int, int], components: int, dtype: str) -> moderngl.Texture:
-    """A texture whose rows are not padded. Raises `GraphicsMemoryError`."""
+    """A texture whose rows are not padded. Raises `GraphicsMemoryError` and as `making`."""
     _ = ctx.error  # of whatever was before
-    texture = ctx.texture(size, components, dtype=dtype, alignment=1)
+    with making():
+        texture = ctx.texture(size, components, dtype=dtype, alignment=1)
     if ctx.error == "GL_OUT_OF_MEMORY":
         texture.release()
         raise GraphicsMemoryError(f"there is no room for {size[0]} x {size[1]} x {components} more")

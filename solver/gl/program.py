@@ -9,6 +9,8 @@ from pathlib import PurePosixPath
 
 import moderngl
 
+from solver.gl.context import making
+
 _INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"')
 _READS = re.compile(r"^//\s*reads:\s*(\d+)", re.MULTILINE)
 _VERTICES = re.compile(r"^//\s*vertices:\s*(\S+)", re.MULTILINE)
@@ -110,6 +112,7 @@ def compile_program(ctx: moderngl.Context, fragment: str, defines: dict[str, obj
 
     Raises:
         ShaderError: if it does not compile; names the file and the line, includes resolved.
+        ContextError: as `making`.
     """
     vertex_source, source, table = program_sources(fragment, defines)
 
@@ -119,6 +122,7 @@ def compile_program(ctx: moderngl.Context, fragment: str, defines: dict[str, obj
         return f"shaders/{file}:{number}"
 
     try:
-        return ctx.program(vertex_shader=vertex_source, fragment_shader=source)
+        with making():
+            return ctx.program(vertex_shader=vertex_source, fragment_shader=source)
     except moderngl.Error as error:
         raise ShaderError(f"shaders/{fragment} does not compile:\n{_LOG_LINE.sub(place, str(error))}") from error

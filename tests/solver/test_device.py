@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import json
 import os
 import subprocess
@@ -19,6 +20,7 @@ from solver.gl.context import GPU, ContextError, NoSuchDevice
 from solver.gl.device import MOST_PASSES, Device
 from solver.gl.field import FieldPool
 from solver.gl.passes import Pass
+from solver.gl.program import compile_program
 from support.gl_objects import living
 
 ROOT = Path(__file__).parents[2]
@@ -245,3 +247,32 @@ def test_a_field_of_a_pool_is_another_where_anything_of_it_is(device: Device) ->
         other = pool.get("role", size, components, dtype)
         assert (other.size, other.components, other.dtype) == (size, components, dtype)
     pool.release()
+
+
+@linux
+def test_a_driver_that_has_stopped_is_told_as_that_and_not_as_a_bug(device: Device):
+    """Without a context that answers, as after a reset, GL gives no more objects; shaders seemed not to compile."""
+    egl = ctypes.CDLL("libEGL.so.1")
+    names = ("eglGetCurrentDisplay", "eglGetCurrentContext", "eglGetCurrentSurface")
+    for name in names:
+        getattr(egl, name).restype = ctypes.c_void_p
+    egl.eglMakeCurrent.argtypes = [ctypes.c_void_p] * 4
+    device.use()
+    kept = device.field((4, 4))
+    display, context, surface = (getattr(egl, name)(0x3059) for name in names)  # EGL_DRAW, for the last of them
+    assert context
+    made = (
+        lambda: device.field((8, 8)),
+        lambda: kept.framebuffer,
+        lambda: device.framebuffer((kept.texture, kept.texture)),
+        lambda: compile_program(device.ctx, "step/scale.frag", {}),
+    )
+    kept.__dict__.pop("framebuffer", None)
+    egl.eglMakeCurrent(display, None, None, None)
+    try:
+        for make in made:
+            with pytest.raises(ContextError, match="the graphics driver has stopped working; start fluidwarp again"):
+                make()
+    finally:
+        egl.eglMakeCurrent(display, surface, surface, context)
+    kept.release()

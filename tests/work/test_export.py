@@ -6,6 +6,7 @@ import json
 import re
 import subprocess
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
 from functools import partial
@@ -23,7 +24,7 @@ from app.media import ffmpeg
 from app.media.auxiliary import Pictures
 from app.media.depth import to_bits
 from app.media.displacement import Displacement, cropped, to_st
-from app.media.files import takes_place
+from app.media.files import is_sequence, takes_place
 from app.media.maps import read_map, write_map
 from app.media.pictures import read_picture, write_picture
 from app.media.source import open_source
@@ -672,3 +673,28 @@ def test_a_map_that_tears_a_large_picture_is_told(device: Device, tmp_path: Path
     with pytest.raises(UserError, match=r"^torn\.npy cannot be applied: the map tears a patch"):
         run(device, job, Progress())
     assert not (tmp_path / "x.png").exists()
+
+
+@pytest.mark.parametrize("name", ["out.png", "out.mp4", "out.gif", "map.exr", "stats.json", "f.%02d.png"])
+def test_a_file_that_another_program_writes_meanwhile_is_not_replaced_without_a_word(
+    device: Device, picture: Path, tmp_path: Path, name: str
+):
+    """Two tasks of a farm for one file, or a person who works on while it is exported."""
+    own = {"stats.json": {"stats": tmp_path / name}, "map.exr": {"maps": MapOutput(tmp_path / name)}}.get(name)
+    outputs = Outputs(**{"file": tmp_path / "out.png" if own else tmp_path / name} | (own or {}))
+    (tmp_path / name).write_text("from before")
+
+    def said(meanwhile: Callable[[], object]) -> list[str]:
+        def report(done: int, total: int | None) -> None:
+            if done == 1:
+                meanwhile()
+
+        job = Job(Recipe.parse(WHIRL), open_source(picture).picture, tmp_path, outputs)
+        told = run(device, job, Progress(report=report)).notices
+        assert not is_sequence(name) or (tmp_path / "f.00.png").is_file()
+        return [line for line in told if "another program" in line]
+
+    assert said(lambda: None) == []
+    line = f"{name}: another program wrote this file while it was being made; what that wrote is replaced"
+    assert said(lambda: (tmp_path / name).write_text("of another")) == ([] if is_sequence(name) else [line])
+    assert is_sequence(name) or (tmp_path / name).read_bytes() != b"of another"

@@ -372,6 +372,45 @@ def test_a_journal_belongs_to_one(desk: Desk, tmp_path: Path) -> None:
     assert is_all_of(found_in(desk.root), other.document)
 
 
+def test_an_empty_folder_that_is_taken_while_it_is_removed_stays_its_takers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A window begins a journal while another one starts and tidies: its lock was gone, so a third was offered it."""
+    mine = recovery.LockedFolder.new(tmp_path)
+    taken: list[Lock | None] = []
+    release = Lock.release
+
+    def released(lock: Lock) -> None:
+        release(lock)
+        monkeypatch.setattr(Lock, "release", release)
+        taken.append(Lock.take(mine.folder / recovery.LOCK))
+
+    monkeypatch.setattr(Lock, "release", released)
+    mine.discard()
+    assert taken[0] is not None
+    assert Lock.take(mine.folder / recovery.LOCK) is None
+    taken[0].release()
+
+
+def test_a_folder_that_is_removed_before_it_is_locked_is_made_anew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[Path] = []
+    mkdtemp = tempfile.mkdtemp
+
+    def make(prefix: str, dir: Path) -> str:
+        made.append(Path(mkdtemp(prefix=prefix, dir=dir)))
+        if len(made) == 1:
+            made[0].rmdir()  # by another one, which found nothing in it
+        return str(made[-1])
+
+    monkeypatch.setattr(tempfile, "mkdtemp", make)
+    mine = recovery.LockedFolder.new(tmp_path)
+    assert [mine.folder] == made[1:]
+    mine.discard()
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_lock_ends_with_its_process(tmp_path: Path) -> None:
     path = tmp_path / "lock"
     code = (
