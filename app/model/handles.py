@@ -249,8 +249,8 @@ class RecipeHandle(_Led, Course):
             ways = (np.clip((one, other), 0.0, 1.0).tolist() for one, other in zip((x, y), place, strict=True))
             across, down = (one + part * (other - one) for one, other in ways)
             keys = *keys, (time, across, down)
-        turn = self.turn(max(time, self.upright), dt)
-        if turn != (turned[-1][1:] if turned else (self.rotate or 0.0, self.scale or 1.0)):
+        turn = self.turn(time, dt)
+        if time > self.upright and turn != (turned[-1][1:] if turned else (self.rotate or 0.0, self.scale or 1.0)):
             turned = *turned, (time, *turn)
         if self.turned and not turned and self.rotate is None and self.scale is None:
             turned = ((self.start, 0.0, 1.0),)  # it is measured as one that is turned
