@@ -15,7 +15,7 @@ import numpy as np
 from app.errors import UserError
 from app.media.files import replacing
 from app.media.inputs import read_input
-from app.media.outlines import SPACING, paired
+from app.media.outlines import SPACING, is_closed, paired
 
 MOST_BYTES = 2**20
 FARTHEST = 1e6  # pixels: nobody's landmark lies beyond
@@ -36,10 +36,12 @@ class Pairs(NamedTuple):
     Attributes:
         places: (n, 2, 2), of each where it is and where it should be, as fractions of the picture's width and height.
         curves: the curve that each lies on, in the order in which it is gone along; "" of points by themselves.
+        closed: the names of those curves that end where they begin, which is listed once.
     """
 
     places: np.ndarray
     curves: tuple[str, ...]
+    closed: frozenset[str] = frozenset()
 
     @classmethod
     def points(cls, places: np.ndarray) -> Pairs:
@@ -62,11 +64,11 @@ def read_pairs(paths: Sequence[Path], size: Size) -> Pairs:
     """
     files, has = " and ".join(str(path) for path in paths), "has" if len(paths) == 1 else "have"
     if len(paths) == 1 and check_ending(paths[0]) == ".csv":
-        pixels, curves = _read_csv(paths[0], _lines(paths[0]), SPACING * max(size))
-        if not len(pixels):
+        found = _read_csv(paths[0], _lines(paths[0]), SPACING * max(size))
+        if not len(found.places):
             raise UserError(f"{files} has no pairs")
-        _check_spread(files, [pixels], size)
-        return Pairs(pixels / size, curves)
+        _check_spread(files, [found.places], size)
+        return found._replace(places=found.places / size)
     sets, counted = list[np.ndarray](), list[np.ndarray]()
     for path in paths:
         found = _read(path, size)
@@ -87,7 +89,7 @@ def read_pairs(paths: Sequence[Path], size: Size) -> Pairs:
 def write_pairs(path: Path, pairs: Pairs, size: Size) -> None:
     """Write correspondences as `read_pairs` gives them; .pts has one set only, and gets where the points should be.
 
-    Only CSV knows curves; in the others their points are points.
+    Only CSV knows curves, a closed one by its first place, which it ends with; in the others their points are points.
 
     Raises:
         UserError: if it cannot be written, or the ending is none of `ENDINGS`.
@@ -95,10 +97,13 @@ def write_pairs(path: Path, pairs: Pairs, size: Size) -> None:
     pixels = pairs.places * size
     match check_ending(path):
         case ".csv":
-            lines = [",".join(COLUMNS), *(",".join(map(_shown, pair)) for pair in pixels.reshape(-1, 4))]
+            rows = [",".join(map(_shown, pair)) for pair in pixels.reshape(-1, 4)]
+            lines = [",".join(COLUMNS), *rows]
             if any(pairs.curves):
-                names = (CURVE, *map(_quoted, pairs.curves))
-                lines = [f"{name},{line}" for name, line in zip(names, lines, strict=True)]
+                lines, last = [f"{CURVE},{lines[0]}"], {name: number for number, name in enumerate(pairs.curves)}
+                for number, name in enumerate(pairs.curves):
+                    again = [pairs.curves.index(name)] if name in pairs.closed and number == last[name] else []
+                    lines += (f"{_quoted(name)},{rows[each]}" for each in (number, *again))
         case ".pts":
             rows = (f"{_shown(x)} {_shown(y)}" for x, y in pixels[:, 1] + 0.5)
             lines = ["version: 1", f"n_points: {len(pixels)}", "{", *rows, "}"]
@@ -131,7 +136,7 @@ def _read(path: Path, size: Size) -> list[np.ndarray]:
     """The sets of landmarks (n, 2) in a file, in pixels from the top-left corner."""
     match check_ending(path):
         case ".csv":
-            found, _ = _read_csv(path, _lines(path), SPACING * max(size))
+            found = _read_csv(path, _lines(path), SPACING * max(size)).places
             return [found[:, 0], found[:, 1]]
         case ".pts":
             return [_read_pts(path, _lines(path)) - 0.5]
@@ -163,8 +168,8 @@ def _lines(path: Path) -> Lines:
     return ((number, line) for number, line in lines if line and not line.startswith("#"))
 
 
-def _read_csv(path: Path, lines: Lines, spacing: float) -> tuple[np.ndarray, tuple[str, ...]]:
-    """Pairs (n, 2, 2) in pixels and the curve of each, whose points are so many pixels apart at most."""
+def _read_csv(path: Path, lines: Lines, spacing: float) -> Pairs:
+    """Pairs in pixels; the points of curves are so many pixels apart at most."""
     columns, groups = list[str](COLUMNS), dict[tuple[str, int], tuple[list[list[float]], list[list[float]]]]()
     for first, (number, line) in enumerate(lines):
         curve_at = columns.index(CURVE) if CURVE in columns else None
@@ -184,7 +189,7 @@ def _read_csv(path: Path, lines: Lines, spacing: float) -> tuple[np.ndarray, tup
         for side, places in zip(sides, groups.setdefault((curve, 0 if curve else number), ([], [])), strict=True):
             if any(side) or not curve:
                 places.append(_numbers(path, number, line, side, 2, wanted))
-    pairs, curves = [np.zeros((0, 2, 2))], []
+    pairs, curves, closed = [np.zeros((0, 2, 2))], [], set[str]()
     for (curve, _), (here, there) in groups.items():
         try:
             found = paired(np.array(here), np.array(there), spacing) if curve else np.array([[*here, *there]])
@@ -192,7 +197,8 @@ def _read_csv(path: Path, lines: Lines, spacing: float) -> tuple[np.ndarray, tup
             raise UserError(f"{path}: the curve {curve[:40]!r} {error}") from None
         pairs.append(found)
         curves += [curve] * len(found)
-    return np.concatenate(pairs), tuple(curves)
+        closed |= {curve} if curve and is_closed(np.array(here)) else set()
+    return Pairs(np.concatenate(pairs), tuple(curves), frozenset(closed))
 
 
 def _words(line: str, counts: tuple[int, ...], curve_at: int | None) -> list[str]:

@@ -29,17 +29,22 @@ def paired(one: np.ndarray, other: np.ndarray, spacing: float) -> np.ndarray:
     if min(len(one), len(other)) < 2 or not np.ptp(one, axis=0).any() or not np.ptp(other, axis=0).any():
         raise ValueError("needs two different places on both sides")
     lengths = [float(np.hypot(*np.diff(line, axis=0).T).sum()) for line in (one, other)]
-    closed = [len(line) > 2 and bool((line[0] == line[-1]).all()) for line in (one, other)]
+    closed = [is_closed(line) for line in (one, other)]
     if closed[0] != closed[1]:
         raise ValueError("is closed on one side only")
     count = int(np.clip(np.ceil(max(lengths) / spacing) + (not closed[0]), FEWEST, MOST))
     return np.stack([resampled(line, count) for line in (one, other)], axis=1)
 
 
+def is_closed(line: np.ndarray) -> bool:
+    """True if a polyline (n, 2) ends where it begins."""
+    return len(line) > 2 and bool((line[0] == line[-1]).all())
+
+
 def resampled(line: np.ndarray, count: int) -> np.ndarray:
     """Points (count, 2) evenly along a polyline (n, 2); of one that ends where it begins that place comes once."""
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
-    closed = len(line) > 2 and bool((line[0] == line[-1]).all())
+    closed = is_closed(line)
     wanted = np.linspace(0.0, along[-1], count + closed)[:count]
     return np.stack([np.interp(wanted, along, line[:, axis]) for axis in (0, 1)], axis=-1)
 

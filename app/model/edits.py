@@ -29,11 +29,17 @@ ROOM = (
 def cut_off(recipe: Recipe, tick: int) -> Recipe:
     """What of a recipe is done before a tick, and lasts until then."""
     dt = recipe.fluid.dt
-    handles = (handle.before(tick, dt) for handle in recipe.handle)
+    handles = [before for handle in recipe.handle if (before := handle.before(tick, dt)) is not None]
+    pins = [pin for pin in recipe.pin if pin.first_tick(dt) < tick]
+    resets = {change.tick * dt for change in recipe.change if change.reset_warp and change.tick >= tick}
+    handles, pins = (  # what a reset let go of that is cut off goes on to hold
+        tuple(led.model_copy(update={"end": None}) if led.end in resets else led for led in all_)
+        for all_ in (handles, pins)
+    )
     return recipe.edited(
         stroke=tuple(part for stroke in recipe.stroke for part in stroke.cut(tick)),
-        handle=tuple(handle for handle in handles if handle is not None),
-        pin=tuple(pin for pin in recipe.pin if pin.first_tick(dt) < tick),
+        handle=handles,
+        pin=pins,
         change=tuple(change for change in recipe.change if change.tick < tick),
         mask=tuple(edit for edit in recipe.mask if edit.tick <= tick),
         duration=max(tick, 1) * dt,
@@ -55,8 +61,8 @@ def with_taken(recipe: Recipe, led: RecipeHandle | RecipePin, tick: int) -> tupl
     """A recipe in which a handle can be led on, and its number; a pin becomes one, for good if it is led."""
     if isinstance(led, RecipePin):
         handle = RecipeHandle.model_validate(led.model_dump() | {"keys": ()})
-        pins = tuple(pin for pin in recipe.pin if pin != led)
-        recipe = recipe.edited(pin=pins, handle=(*recipe.handle, handle))
+        at = recipe.pin.index(led)
+        recipe = recipe.edited(pin=(*recipe.pin[:at], *recipe.pin[at + 1 :]), handle=(*recipe.handle, handle))
     else:
         # What comes after this moment has been cut off, if the playhead was sent back here.
         cut = led.before(tick, recipe.fluid.dt)

@@ -245,15 +245,13 @@ class RecipeHandle(_Led, Course):
         if (keys, turned) == mine:
             return self
         (x, y), place, part = between(self.to or self.at, self.ready, mine[0], max(time, self.ready), dt)
-        if part and place != (x, y):
+        if part:
             ways = (np.clip((one, other), 0.0, 1.0).tolist() for one, other in zip((x, y), place, strict=True))
             across, down = (one + part * (other - one) for one, other in ways)
             keys = *keys, (time, across, down)
-        first = self.rotate or 0.0, self.scale or 1.0
-        here, there, part = between(first, self.upright, self.turned, max(time, self.upright), dt)
-        if part and there != here:
-            angle, scale = here[0] + part * (there[0] - here[0]), here[1] ** (1 - part) * there[1] ** part
-            turned = *turned, (time, angle, scale)
+        turn = self.turn(time, dt)
+        if time > self.upright and turn != (turned[-1][1:] if turned else (self.rotate or 0.0, self.scale or 1.0)):
+            turned = *turned, (time, *turn)
         if self.turned and not turned and self.rotate is None and self.scale is None:
             turned = ((self.start, 0.0, 1.0),)  # it is measured as one that is turned
         return self.model_copy(update={"keys": keys, "turned": turned})

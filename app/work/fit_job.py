@@ -59,11 +59,12 @@ def pairs_in(
     given, notices = [read_pairs(files, size)] if files else [], list[str]()
     if masks:
         outline, notices = read_outlines(*masks, size)
-        given.append(Pairs(outline / size, ("outline",) * len(outline)))
+        given.append(Pairs(outline / size, ("outline",) * len(outline), frozenset(("outline",))))
     if not given:
         return None, notices
     places = np.concatenate([pairs.places for pairs in given])
-    return Pairs(places, sum((pairs.curves for pairs in given), ())), notices
+    closed = frozenset[str]().union(*(pairs.closed for pairs in given))
+    return Pairs(places, sum((pairs.curves for pairs in given), ()), closed), notices
 
 
 @dataclass(frozen=True)

@@ -341,7 +341,7 @@ def _aimed(device: Device, recipe: Recipe, pictures: Pictures, pairs: Pairs | No
         # those that push as a fluid does halt where what is local has pressed the picture together.
         one = RecipeHandle(at=(0.5, 0.5), keys=(), start=start, local=1.0 if any(pairs.curves) else 0.0)
         names = tuple(f"{NAME} {number}" for number in range(1, len(pairs.places) + 1))
-        pairs, leads = Pairs(np.round(pairs.places, DECIMALS), pairs.curves), list[_Lead]()
+        pairs, leads = pairs._replace(places=np.round(pairs.places, DECIMALS)), list[_Lead]()
         for name, (at, to) in zip(names, pairs.places.tolist(), strict=True):
             x, y = np.clip(at, -10.0, 10.0).tolist()  # as far as a recipe goes: what is outside is left out
             handle = one.model_copy(update={"name": name, "at": (x, y), "to": tuple(to)})
@@ -571,7 +571,8 @@ class _Search:
         if missed and trial.verdict is not None:
             self.notices.append(trial.verdict)
         arrived = np.stack([self.pairs[:, 0], trial.arrived], axis=1)[self.numbers]
-        pairs = Pairs(arrived, tuple(self.aim.pairs.curves[number] for number in self.numbers))
+        curves = tuple(self.aim.pairs.curves[number] for number in self.numbers)
+        pairs = self.aim.pairs._replace(places=arrived, curves=curves)
         is_met = not (missed or trial.folds) and len(self.numbers) == len(self.pairs)
         return Fitted(trial, pairs, errors, stopped, is_met, tuple(self.notices), self.noun)
 

@@ -168,15 +168,6 @@ class Handle(Course):
         far_x, far_y = within(there)
         return np.array((x0 + (1 - part) * x + part * far_x, y0 + (1 - part) * y + part * far_y))
 
-    def turn(self, time: float, dt: float) -> tuple[float, float]:
-        """The angle, radians, and the scale that it shall have at a time; as `wanted`."""
-        rotate, scale = self.rotate or 0.0, self.scale or 1.0
-        if not self.turned or time < self.upright:
-            return math.radians(rotate) * self.passed(time), scale ** self.passed(time)
-        here, there, part = between((rotate, scale), self.upright, self.turned, time, dt)
-        angle = (1 - part) * here[0] + part * there[0]
-        return math.radians(angle), here[1] ** (1 - part) * there[1] ** part
-
     @cached_property
     def reach(self) -> float:
         """Its radius, or what its line needs."""
@@ -206,15 +197,6 @@ class Handle(Course):
         """The length of its line, at its start or in the end."""
         lines = (_line(each, self.closed) for each in (self.points, self.goals) if each)
         return max((float(_lengths(line)[-1]) for line in lines), default=0.0)
-
-    def passed(self, time: float) -> float:
-        """The part of its way, 0-1, that it shall have gone at a time."""
-        if time >= self.start + self.duration:
-            return 1.0
-        if time <= self.start:  # also where it goes its way at once
-            return 0.0
-        part = (time - self.start) / self.duration
-        return part * part * (3 - 2 * part)
 
 
 @dataclass(frozen=True)
@@ -369,10 +351,8 @@ class Shape:
         angle, scale = handle.turn(time, dt)
         if self.goals is not None:  # before they are turned
             assert handle.to is not None
-            part, turned = handle.passed(time), math.radians(handle.rotate or 0.0)
-            from_middle = (1 - part) * from_middle + part / (handle.scale or 1.0) * _spun(
-                self.goals - handle.to, -turned
-            )
+            part, goals = handle.passed(time), _spun(self.goals - handle.to, -(handle.rotate or 0.0))
+            from_middle = (1 - part) * from_middle + part / (handle.scale or 1.0) * goals
         return there + scale * _spun(from_middle, angle)
 
 
@@ -384,7 +364,8 @@ def spun(motion: np.ndarray, arms: np.ndarray) -> np.ndarray:
 
 
 def _spun(arms: np.ndarray, angle: float) -> np.ndarray:
-    """Arms (n, 2) turned by an angle, radians clockwise."""
+    """Arms (n, 2) turned by an angle, degrees clockwise."""
+    angle = math.radians(angle)
     turn = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
     return arms @ turn
 

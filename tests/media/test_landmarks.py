@@ -158,6 +158,22 @@ def test_curves_come_back_as_they_were_written(tmp_path: Path) -> None:
     np.testing.assert_allclose(found.places[[0, 1, -1]], curve.places[[0, 1, -1]], atol=1e-9)
 
 
+def test_a_closed_curve_comes_back_closed(tmp_path: Path) -> None:
+    """It came back open: without the part from its last place to its first."""
+    around = np.linspace(0, 2 * np.pi, 13)[:-1]
+    ring = 0.5 + 0.2 * np.stack([np.cos(around), np.sin(around)], axis=-1)
+    places = np.stack([ring, ring + 0.1], axis=1)
+    curves = ("ring",) * 12 + ("", "stem", "stem")
+    places = np.concatenate([places, places[:3]])
+    write_pairs(tmp_path / "out.csv", Pairs(places, curves, frozenset({"ring"})), SIZE)
+    rows = (tmp_path / "out.csv").read_text().splitlines()
+    assert rows[1] == rows[13]
+    found = read_pairs([tmp_path / "out.csv"], SIZE)
+    assert found.closed == {"ring"}
+    middles = [found.places[np.array(found.curves) == "ring"].mean(axis=0), places[:12].mean(axis=0)]
+    np.testing.assert_allclose(*middles, atol=1e-6)
+
+
 @pytest.mark.parametrize(
     ("name", "text", "said"),
     [

@@ -111,6 +111,7 @@ def test_what_is_led_before_a_tick() -> None:
     [
         {"to": [0.5, 0.55], "duration": 0.4, "rotate": 20.0},
         {"to": None, "scale": 0.5, "duration": 0.4},
+        {"to": None, "rotate": 20.0, "duration": 0.4, "turned": [[0.4, -30.0, 0.5], [2.1, 0.0, 1.0]]},
         {"to": None, "keys": [[0.1, 0.45, 0.5], [2.2, 0.52, 0.48]]},
     ],
 )
@@ -120,6 +121,7 @@ def test_what_is_cut_off_between_two_keys_stays_where_it_has_come_to(more: dict[
     led, dt = handle(at=[0.45, 0.5], **keys | more), 0.1
     cut = led.before(tick, dt)
     assert cut is not None
+    assert RecipeHandle.model_validate(cut.model_dump()) == cut
     assert cut.last == pytest.approx(min(max(tick * dt, cut.ready, cut.upright), led.last))
     names, start = ("at", "to", "radius", "duration", "rotate", "scale", "keys", "turned"), np.array(led.at)
     whole, part = (Handle(**{name: getattr(each, name) for name in names}) for each in (led, cut))

@@ -13,7 +13,7 @@ from app.errors import UserError
 from app.media.opening import shipped_recipes
 from app.media.recipes import read_recipe
 from app.model import toml
-from app.model.edits import cut_off
+from app.model.edits import cut_off, with_change, with_taken
 from app.model.recipe import DensitySettings, FluidSettings, Output, Playback, Recipe
 from app.model.schema import written
 from app.model.strokes import Change, Dab, Sample, Stroke
@@ -405,6 +405,25 @@ def test_what_is_cut_off_at_a_tick_is_what_was_passed_before_it():
         assert [cut.at(k) for k in range(tick)] == [stroke.at(k) for k in range(tick)]
     assert stroke.before(2) is None
     assert stroke.before(7) is stroke
+
+
+def test_what_a_reset_lets_go_of_is_held_again_where_the_reset_is_cut_off():
+    """Who went back before the reset and painted lost the handles when the time of the reset had come."""
+    text = "duration = 2.0\nhandle = [{at = [0.4, 0.5], keys = [[0.1, 0.5, 0.5]]}]\n"
+    recipe = Recipe.parse(f"{text}pin = [{{at = [0.8, 0.8]}}, {{at = [0.2, 0.2], end = 0.5}}]")
+    held = recipe.handle[0].end, *(pin.end for pin in recipe.pin)
+    reset = with_change(recipe, tick := 96, {"reset_warp": True}, lasts=False)
+    assert all(led.end == tick * recipe.fluid.dt for led in (*reset.handle, *reset.pin[:1]))
+    for until, ends in ((60, held), (97, (1.6, 1.6, 0.5))):
+        cut = cut_off(reset, until)
+        assert (cut.handle[0].end, *(pin.end for pin in cut.pin)) == pytest.approx(ends)
+
+
+def test_of_two_pins_on_one_spot_one_is_led_and_the_other_stays():
+    recipe = Recipe.parse("pin = [{at = [0.4, 0.5]}, {at = [0.4, 0.5]}]")
+    taken, number = with_taken(recipe, recipe.pin[1], 5)
+    assert taken.pin == recipe.pin[:1]
+    assert taken.handle[number].at == (0.4, 0.5)
 
 
 def test_what_is_left_of_a_recipe_whose_handles_are_cut_off_waits_for_none_and_can_be_read_again():

@@ -47,7 +47,7 @@ def test_after_its_first_turn_a_handle_turns_evenly_and_grows_by_even_factors() 
     after = TIMES >= 1.0
     angles, scales = np.array([handle.turn(time, DT) for time in TIMES[after].tolist()]).T
     times, rows = [1.0, *(key[0] for key in turned)], np.array([(45.0, 1.5), *(key[1:] for key in turned)])
-    assert np.degrees(angles) == pytest.approx(np.interp(TIMES[after], times, rows[:, 0]), abs=1e-9)
+    assert angles == pytest.approx(np.interp(TIMES[after], times, rows[:, 0]), abs=1e-9)
     assert np.log(scales) == pytest.approx(np.interp(TIMES[after], times, np.log(rows[:, 1])), abs=1e-9)
 
 

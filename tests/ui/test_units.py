@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from app.ui.units import PERCENT, SECONDS, THREE_DIGITS, Unit
+from app.ui.units import PERCENT, SECONDS, THREE_DIGITS, Unit, picture_pixels
 
-PIXELS = Unit(" px", 1200)
+PIXELS, FEW = picture_pixels(1200), picture_pixels(64)
 
 
 @pytest.mark.parametrize(
@@ -14,6 +14,9 @@ PIXELS = Unit(" px", 1200)
     [
         (PIXELS, 0.1125, "135 px", 135.0),
         (PIXELS, 0.11273, "135 px", 135.0),
+        (FEW, 0.001, "0.064 px", 0.064),  # it was shown as 0
+        (FEW, 0.1, "6.4 px", 6.4),
+        (FEW, 0.156, "10 px", 10.0),
         (PERCENT, 0.8, "80%", 80.0),
         (SECONDS, 1.5, "1.50 s", 1.5),
         (THREE_DIGITS, 0.03, "0.03", 0.03),

@@ -599,6 +599,7 @@ def test_outlines_of_masks_are_fitted_and_written_as_a_curve(fluidwarp: Run, tmp
     assert "f.toml: 14 pairs, mean error" in done.stderr
     there = read_pairs([tmp_path / "a.csv"], (64, 48))
     assert set(there.curves) == {"outline"}
+    assert there.closed == {"outline"}
     end = there.places[:, 1] * (64, 48)
     np.testing.assert_allclose(((end[:, 0] - 32) / 13) ** 2 + ((end[:, 1] - 24) / 9) ** 2, 1, atol=0.1)
 

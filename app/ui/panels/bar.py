@@ -17,7 +17,7 @@ from app.ui.editor_state import LIMITS, EditorState
 from app.ui.layout import Layout
 from app.ui.panels import brushes, feels
 from app.ui.preferences import LONGEST_STRING, Preferences
-from app.ui.units import PERCENT, POINTS, Unit
+from app.ui.units import PERCENT, POINTS, picture_pixels
 from app.ui.widgets import Ui
 from app.ui.workspace import Workspace
 
@@ -174,7 +174,7 @@ def _directions(ui: Ui, state: EditorState, width: float) -> None:
 def _slider(ui: Ui, workspace: Workspace, state: EditorState, setting: Setting, width: float) -> None:
     brush, is_size = state.brush, setting.name == "radius"
     value: float = getattr(brush, setting.name)
-    unit = Unit(" px", 2 * max(workspace.canvas.size)) if is_size else PERCENT
+    unit = picture_pixels(2 * max(workspace.canvas.size)) if is_size else PERCENT
     low, high = LIMITS[setting.name]
     raises = f"{ui.shown(setting.raises)}: more. " if ui.shown(setting.raises) else ""
     slid = ui.slider(

@@ -15,7 +15,7 @@ import numpy as np
 from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
-from app.model.handles import RecipeHandle, RecipePin, heading, labelled
+from app.model.handles import ARRIVED, RecipeHandle, RecipePin, heading, labelled
 from app.model.mask_edits import MASKS, THICKEST, THINNEST, MaskStroke, PictureMask, is_brightness
 from app.model.presets import DEFAULT
 from app.model.strokes import Symmetry
@@ -26,7 +26,7 @@ from app.ui.panels import feels, selected_bar
 from app.ui.quality import Quality
 from app.ui.selecting import Selecting
 from app.ui.theme import packed
-from app.ui.units import DEGREES, PER_SECOND, PERCENT, THREE_DIGITS, TIMES, Unit
+from app.ui.units import DEGREES, PER_SECOND, PERCENT, THREE_DIGITS, TIMES, picture_pixels
 from app.ui.viewport import Rect
 from app.ui.widgets import Slid, Ui
 from app.ui.workspace import Workspace
@@ -162,7 +162,7 @@ def _which_mask(ui: Ui, state: EditorState) -> None:
 
 def _handles(ui: Ui, workspace: Workspace, state: EditorState, do: Do) -> None:
     session = workspace.session
-    pixels = Unit(" px", 2 * max(workspace.canvas.size))
+    pixels = picture_pixels(2 * max(workspace.canvas.size))
     label, recipe = state.selected, session.recipe
     if (led := dict(labelled(recipe.handle, recipe.pin)).get(label)) is None:
         ui.wrapped(
@@ -249,15 +249,15 @@ def whereabouts(workspace: Workspace, label: str, led: RecipeHandle | RecipePin)
     """How far the middle of the handle that is called so is led, and how far what is farthest of it has still to go, in
     pixels; or why it does nothing.
     """
-    session, pixels = workspace.session, max(workspace.canvas.size)
+    session, pixels = workspace.session, picture_pixels(max(workspace.canvas.size))
     for held in session.held:
         if held.label == label:
             way = hypot(*np.subtract(held.start, held.target) * session.extent)
             turns, bends = (led.turns, bool(led.goals)) if isinstance(led, RecipeHandle) else (False, False)
             at_most = "up to " * (turns or bends)
-            rest = f", {at_most}{pixels * held.left:.0f} px left" if held.is_away else ""
-            if pixels * way >= 0.5:  # less would be told as 0
-                return f"moves {pixels * way:.0f} px{rest}"
+            rest = f", {at_most}{pixels.text(held.left)} left" if held.is_away else ""
+            if way > ARRIVED or pixels.number(way) >= 0.5:
+                return f"moves {pixels.text(way)}{rest}"
             return f"{'turned' if turns else 'bent' if bends else 'stays'}{rest}"
     return "muted" if led.muted else "not at work at this moment"
 
@@ -369,7 +369,7 @@ def _masks(ui: Ui, workspace: Workspace, state: EditorState, do: Do) -> None:
     for row in (("invert", "fill", "clear"), ("feather", "grow", "shrink"), ("load", "save")):
         if "grow" in row:
             slid = ui.slider(
-                "mask reach", "By", state.mask_reach, 0.001, 0.25, Unit(" px", max(workspace.canvas.size)), 0.02,
+                "mask reach", "By", state.mask_reach, 0.001, 0.25, picture_pixels(max(workspace.canvas.size)), 0.02,
                 logarithmic=True, title="How far", more="How far Feather, Grow and Shrink move its edges.",
             )  # fmt: skip
             state.mask_reach = slid.value
