@@ -745,12 +745,12 @@ opacity viscosity, Opacity: 0% to 100%, 70%
 opacity frozen, Opacity: 0% to 100%, 70%
 opacity velocity, Opacity: 0% to 100%, 70%
 opacity forces, Opacity: 0% to 100%, 70%
-mask reach, By: 0 px to 60 px by ratios, 5 px
+mask reach, By: 0.24 px to 60 px by ratios, 4.8 px
 amount, Amount: 0% to 150%, 100%
-radius, Size: 0 px to 240 px by ratios, 72 px
+radius, Size: 0.48 px to 240 px by ratios, 72 px
 stiffness, Stiffness: 1% to 100%, 100%
 local, Local: 0% to 100%, 0%
-held radius, Size: 0 px to 480 px by ratios, 72 px
+held radius, Size: 0.48 px to 480 px by ratios, 72 px
 held stiffness, Stiffness: 1% to 100%, 100%
 held local, Local: 0% to 100%, 0%
 held rotate, Rotate: -180° to 180°, 0°
