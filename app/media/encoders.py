@@ -191,8 +191,8 @@ ANIMATIONS = {
         {"h264": _mp4, "h265": _h265},
         even=True,
         sound=("aac", "mp3", "ac3"),
-        ahead=("aac", "mp3", "ac3"),
         encoder=("-c", "aac", "-b", "192k"),
+        ahead=("aac", "mp3", "ac3"),
         roles=(*ROLES, "captions", "descriptions"),
     ),
     ".webm": Container(
@@ -200,8 +200,8 @@ ANIMATIONS = {
         {"vp9": _webm, "av1": _av1},
         even=True,
         sound=("opus", "vorbis"),
-        ahead=("opus", "vorbis"),
         encoder=("-c", "libopus", "-b", "128k", "-filter", f"aformat=channel_layouts={'|'.join(LAYOUTS)}"),
+        ahead=("opus", "vorbis"),
         layouts=LAYOUTS,
         roles=("forced",),
     ),
@@ -209,8 +209,8 @@ ANIMATIONS = {
         "FFV1",
         {"ffv1": lossless},
         sound=("flac", "aac", "mp3", "ac3", "opus", "vorbis"),
-        ahead=("ac3", "opus", "vorbis"),  # of AAC and MP3 it would hold the first frame back by a packet
         encoder=("-c", "flac"),
+        ahead=("ac3", "opus", "vorbis"),  # of AAC and MP3 it would hold the first frame back by a packet
         layouts=LAYOUTS,
         roles=(*ROLES, "original"),
     ),
@@ -220,8 +220,8 @@ ANIMATIONS = {
         even=True,
         languages=MAC_NAMES,
         sound=("pcm_s16le", "pcm_s24le", "aac"),
-        ahead=("aac",),
         encoder=("-c", "pcm_s16le"),
+        ahead=("aac",),
     ),
     ".gif": Container("GIF", {"gif": lossless}, passes=2),  # by way of a lossless file, see `animation_writer`
     ".apng": Container("APNG", {"apng": _apng}),

@@ -680,9 +680,14 @@ def test_a_file_that_another_program_writes_meanwhile_is_not_replaced_without_a_
     device: Device, picture: Path, tmp_path: Path, name: str
 ):
     """Two tasks of a farm for one file, or a person who works on while it is exported."""
-    own = {"stats.json": {"stats": tmp_path / name}, "map.exr": {"maps": MapOutput(tmp_path / name)}}.get(name)
-    outputs = Outputs(**{"file": tmp_path / "out.png" if own else tmp_path / name} | (own or {}))
-    (tmp_path / name).write_text("from before")
+    file = tmp_path / name
+    if name == "stats.json":
+        outputs = Outputs(tmp_path / "out.png", stats=file)
+    elif name == "map.exr":
+        outputs = Outputs(tmp_path / "out.png", maps=MapOutput(file))
+    else:
+        outputs = Outputs(file)
+    file.write_text("from before")
 
     def said(meanwhile: Callable[[], object]) -> list[str]:
         def report(done: int, total: int | None) -> None:
@@ -696,5 +701,5 @@ def test_a_file_that_another_program_writes_meanwhile_is_not_replaced_without_a_
 
     assert said(lambda: None) == []
     line = f"{name}: another program wrote this file while it was being made; what that wrote is replaced"
-    assert said(lambda: (tmp_path / name).write_text("of another")) == ([] if is_sequence(name) else [line])
-    assert is_sequence(name) or (tmp_path / name).read_bytes() != b"of another"
+    assert said(lambda: file.write_text("of another")) == ([] if is_sequence(name) else [line])
+    assert is_sequence(name) or file.read_bytes() != b"of another"
