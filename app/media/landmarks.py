@@ -89,7 +89,8 @@ def read_pairs(paths: Sequence[Path], size: Size) -> Pairs:
 def write_pairs(path: Path, pairs: Pairs, size: Size) -> None:
     """Write correspondences as `read_pairs` gives them; .pts has one set only, and gets where the points should be.
 
-    Only CSV knows curves, a closed one by its first place, which it ends with; in the others their points are points.
+    Only CSV knows curves, a closed one by its first place, which it ends with. In the others their points are points,
+    as is in CSV the only one that is left of a curve.
 
     Raises:
         UserError: if it cannot be written, or the ending is none of `ENDINGS`.
@@ -102,8 +103,11 @@ def write_pairs(path: Path, pairs: Pairs, size: Size) -> None:
             if any(pairs.curves):
                 lines, last = [f"{CURVE},{lines[0]}"], {name: number for number, name in enumerate(pairs.curves)}
                 for number, name in enumerate(pairs.curves):
-                    again = [pairs.curves.index(name)] if name in pairs.closed and number == last[name] else []
-                    lines += (f"{_quoted(name)},{rows[each]}" for each in (number, *again))
+                    named = _quoted(name) if pairs.curves.count(name) > 1 else ""
+                    again = (
+                        [pairs.curves.index(name)] if named and name in pairs.closed and number == last[name] else []
+                    )
+                    lines += (f"{named},{rows[each]}" for each in (number, *again))
         case ".pts":
             rows = (f"{_shown(x)} {_shown(y)}" for x, y in pixels[:, 1] + 0.5)
             lines = ["version: 1", f"n_points: {len(pixels)}", "{", *rows, "}"]

@@ -822,3 +822,13 @@ def test_what_does_not_fit_into_the_memory_has_a_mend(tmp_path: Path):
     mend = "it does not fit into the memory; close other programs, or make it smaller first"
     with pytest.raises(UserError, match=mend), decoding(tmp_path / "a.png", "PNG"):
         raise MemoryError
+
+
+@pytest.mark.parametrize("error", [KeyError(), KeyError(7), IndexError("12")])
+def test_no_reason_is_told_of_a_decoder_that_gives_none(tmp_path: Path, error: Exception):
+    """It was told as "(KeyError)"."""
+    with (
+        pytest.raises(UserError, match="file is truncated or damaged; get it again"),
+        decoding(tmp_path / "a.png", "PNG"),
+    ):
+        raise error

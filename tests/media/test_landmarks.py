@@ -174,6 +174,13 @@ def test_a_closed_curve_comes_back_closed(tmp_path: Path) -> None:
     np.testing.assert_allclose(*middles, atol=1e-6)
 
 
+def test_the_only_point_that_is_left_of_a_curve_is_written_as_a_point(tmp_path: Path) -> None:
+    """As where the others lie outside of the picture: a curve of one place cannot be read."""
+    places = np.array([[[0.1, 0.2], [0.2, 0.3]], [[0.3, 0.2], [0.4, 0.3]]])
+    write_pairs(tmp_path / "out.csv", Pairs(places, ("stem", "ring"), frozenset({"ring"})), SIZE)
+    np.testing.assert_allclose(read_pairs([tmp_path / "out.csv"], SIZE).places, places, atol=1e-9)
+
+
 @pytest.mark.parametrize(
     ("name", "text", "said"),
     [

@@ -31,8 +31,8 @@ def decoding(file: Path, name: str) -> Iterator[None]:
         ) from None
     except Exception as error:  # decoders of damaged files raise anything: IndexError, struct.error, zlib.error ...
         lines = [line.strip() for line in str(error).splitlines()]
-        reason = next((line for line in lines if line.strip("0123456789")), type(error).__name__)
-        message = f"Cannot read {file}: the {name} file is truncated or damaged ({reason}); get it again."
+        reason = next((f" ({line})" for line in lines if line.strip("0123456789")), "")
+        message = f"Cannot read {file}: the {name} file is truncated or damaged{reason}; get it again."
         raise UserError(message) from error
 
 
