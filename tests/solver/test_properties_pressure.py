@@ -13,7 +13,7 @@ def test_a_thousandth_of_the_divergence_is_left(device: Device, seed: int) -> No
     properties.check_divergence(device, seed)
 
 
-@pytest.mark.parametrize("seed", range(0, 42, 2))  # every other of six sizes by seven masks; nightly.py has all
+@pytest.mark.parametrize("seed", range(0, 42, 3))  # each of seven masks at two of six sizes; nightly.py has all
 def test_it_is_at_every_size(device: Device, seed: int) -> None:
     properties.check_divergence_of_large(device, seed)
 
