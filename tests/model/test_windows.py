@@ -293,7 +293,11 @@ def test_what_stands_still_moves_no_more_than_its_neighbourhood(device: Device, 
     assert off < 0.01 * moved
 
 
-@pytest.mark.parametrize(("feel", "way"), [(PUTTY, 2.5), (HONEY, 2.5), (HONEY, 10.0)])  # honey reaches farther
+@pytest.mark.parametrize(
+    ("feel", "way"),
+    [(PUTTY, 2.5), (HONEY, 2.5), (HONEY, 10.0)],  # honey reaches farther
+    ids=["putty", "honey", "honey, far"],
+)
 def test_nothing_moves_at_the_sides_of_a_window(device: Device, feel: Feel, way: float):
     """Below a twentieth of a pixel of a picture of 6000, all along them, however near the brush has come to them."""
     radius = 160 / 6000
