@@ -210,6 +210,7 @@ def test_what_a_turned_line_lacks_is_told_of_what_is_farthest_of_it(robot: Robot
         "bent, up to": RecipeHandle(at=(0.45, 0.5), points=line, goals=((0.3, 0.4), (0.6, 0.6)), to=(0.45, 0.5)),
         "stays": RecipeHandle(at=(0.45, 0.5), points=line, keys=()),
         "moves 12 px, ": RecipeHandle(at=(0.45, 0.5), to=(0.5, 0.5)),
+        "moves 0.36 px": RecipeHandle(at=(0.45, 0.5), to=(0.4515, 0.5)),  # farther than what has arrived may be
     }
     for told, handle in lines.items():
         session.edit("Handle", handle=(handle,), duration=0.05)
