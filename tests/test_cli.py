@@ -20,8 +20,8 @@ from PIL import Image
 from app import cli, doctor, progress
 from app.errors import UserError
 from app.gallery import figures, retouching
-from app.media.displacement import Displacement
-from app.media.maps import read_map, write_map
+from app.media.displacement import Displacement, PixelPlaces
+from app.media.maps import Kind, read_map, write_map
 from app.media.pictures import read_picture, write_picture
 from app.media.project import from_recipe, save
 from app.model.picture import Picture
@@ -1158,6 +1158,26 @@ def options() -> Iterator[str]:
 def test_every_word_of_the_command_line_takes_what_it_did():
     """Other programs call it: what changes here is told in the changelog."""
     assert [*options()] == (ROOT / "tests/golden/commands.txt").read_text("utf-8").splitlines()
+
+
+WORDS = {
+    "kind": Kind, "grid": PixelPlaces, "edges": Recipe.model_fields["edges"].annotation,
+    "filter_": type(Recipe().output).model_fields["filter"].annotation,
+    "solver": type(Recipe().fluid).model_fields["solver"].annotation,
+}  # fmt: skip
+
+
+def test_the_help_of_a_choice_names_what_can_be_chosen():
+    found = set[str]()
+    for command in cli.cli.registered_commands:
+        assert command.callback is not None
+        for word in signature(command.callback, eval_str=True).parameters.values():
+            takes, how = get_args(word.annotation)
+            if word.name in WORDS and takes in (str, str | None):
+                named = set(re.findall(r"[\w-]+", how.help))
+                assert not set(get_args(WORDS[word.name])) - named, (command.callback.__name__, how.help)
+                found.add(word.name)
+    assert found == set(WORDS)
 
 
 def test_where_standard_output_and_errors_are_closed_it_works_all_the_same(

@@ -177,6 +177,23 @@ def test_names_that_lead_out_of_the_archive_are_kept_in(made: Project, tmp_path:
     assert np.array_equal(projects.load(tmp_path / "work.fluidwarp").picture.pixels, made.picture.pixels)
 
 
+@pytest.mark.parametrize("name", ["recipe.toml", "format.txt", "photo.png"])
+def test_a_picture_that_is_called_as_another_part_of_a_project_takes_no_ones_place(
+    made: Project, tmp_path: Path, name: str
+) -> None:
+    (tmp_path / "masks").mkdir()
+    write_picture(tmp_path / "mask.png", Picture(np.full((30, 40, 1), 255, np.uint8)))
+    (tmp_path / "mask.png").rename(tmp_path / "masks" / name)
+    words = Recipe.parse(f'[[viscosity]]\nkind = "picture"\npicture = "../masks/{name}"\nscale = 1\n')
+    masked = Project(made.recipe.edited(viscosity=words.viscosity), made.picture, made.data, tmp_path / "masks")
+    projects.save(masked, tmp_path / "work.fluidwarp")
+    loaded = projects.load(tmp_path / "work.fluidwarp")
+    (layer,) = loaded.recipe.viscosity
+    assert loaded.recipe.stroke == made.recipe.stroke
+    assert np.array_equal(loaded.picture.pixels, made.picture.pixels)
+    assert (loaded.folder / layer.picture).read_bytes() == (tmp_path / "masks" / name).read_bytes()
+
+
 def renamed(project: Project, name: str) -> Project:
     return replace(project, recipe=project.recipe.edited(name=name))
 

@@ -371,6 +371,10 @@ def test_each_stage_alone_does_what_it_says(fluid: Fluid) -> None:
     before = fluid.u
     fluid.add_force(np.ones((12, 20, 2)), 0.1)
     np.testing.assert_allclose(fluid.u[:, 1:-1] - before[:, 1:-1], 0.1, atol=1e-6)
+    energy = fluid.motion().kinetic_energy
+    fluid.set_viscosity(1.0)  # which it takes up by itself
+    fluid.diffuse(0.1)
+    assert fluid.motion().kinetic_energy < 0.5 * energy
 
 
 @pytest.mark.parametrize("kind", [Fluid, PaperFluid])

@@ -89,3 +89,20 @@ def test_points_are_sought_from_where_they_should_be(is_held: bool, device: Devi
     assert np.hypot(*(found - places + [0.3, 0.0]).T).max() < 8e-3
     assert left.min() > 0.1
     warp.release()
+
+
+@pytest.mark.parametrize(
+    ("cells", "wanted"), [((96, 48), (192, 96)), ((200, 100), (256, 128)), ((300, 150), (300, 150))]
+)
+def test_a_map_is_looked_at_in_two_places_a_cell_up_to_256_and_then_in_one(
+    cells: tuple[int, int], wanted: tuple[int, int], device: Device
+):
+    """Along the longer side, and as close to one another along the shorter one."""
+    warp = WarpMap(device, Grid(*cells), cells)
+    strain, taken = Strain(warp), [0]
+    for _ in range(2):  # at first the map's own texels are looked at too
+        strain.around(np.array([[0.5, 0.25]]), np.array([1.0]))
+        taken.append(sum(device.timings.texel_writes.values()))
+    assert 1 <= (taken[2] - taken[1]) / np.prod(wanted) < 1.02  # a little more for what is found
+    for thing in (strain, warp):
+        thing.release()

@@ -210,6 +210,7 @@ def test_what_a_turned_line_lacks_is_told_of_what_is_farthest_of_it(robot: Robot
         "bent, up to": RecipeHandle(at=(0.45, 0.5), points=line, goals=((0.3, 0.4), (0.6, 0.6)), to=(0.45, 0.5)),
         "stays": RecipeHandle(at=(0.45, 0.5), points=line, keys=()),
         "moves 12 px, ": RecipeHandle(at=(0.45, 0.5), to=(0.5, 0.5)),
+        "moves 0.36 px": RecipeHandle(at=(0.45, 0.5), to=(0.4515, 0.5)),  # farther than what has arrived may be
     }
     for told, handle in lines.items():
         session.edit("Handle", handle=(handle,), duration=0.05)
@@ -407,10 +408,21 @@ def test_what_cannot_be_met_is_told_as_the_command_line_tells_it_until_it_is_men
     assert all(sentence in rendered for sentence in said)
     robot.frame(count=3)
     assert len(robot.editor.messages.shown) <= 2  # told once
+    for place in session.held[-1].now, session.held[-1].target:  # far from one another: it is taken hold of at both
+        robot.move(*robot.at(*place))
+        assert robot.editor.pointer.hovered == session.held[-1]
     robot.key("ctrl+z")
     robot.rest()
     assert not robot.editor.messages.shown
     assert session.objections == ()
+    robot.key("ctrl+y")
+    robot.rest()
+    assert robot.editor.messages.shown
+    session.document.saved()
+    robot.drop(tmp_path / "pattern.png")  # with another work what is told of the last one goes
+    robot.rest()
+    assert robot.editor.session is not session
+    assert not robot.editor.messages.shown
 
 
 def test_a_handle_is_led_on_from_where_it_is_whatever_amount_is_seen(robot: Robot) -> None:

@@ -99,12 +99,17 @@ def contents(folder: Path) -> dict[str, bytes]:
 # Names --------------------------------------------------------------------------------------------------------------
 
 
-def test_names_of_the_results(tmp_path: Path):
+def test_names_of_the_results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     task = order("coffee", None, Outputs(tmp_path / "new/out"))
     pictures = [Path(name) for name in ("a.JPG", "b.bmp", "c.mov", "d.avi")]
     made = [one.outputs.file for one in spread(task, pictures)]
     assert made == [tmp_path / "new/out" / name for name in ("a.JPG", "b.png", "c.mov", "d.mp4")]
     assert not (tmp_path / "new").exists()  # yet
+    # A process elsewhere finds the recipe too: by its place, or by its name if it comes with the program.
+    (tmp_path / "own.toml").write_text(RECIPE)
+    monkeypatch.chdir(tmp_path)
+    for recipe, wanted in (("coffee", "coffee"), ("own.toml", str(tmp_path / "own.toml"))):
+        assert {one.recipe for one in spread(replace(task, recipe=recipe), pictures)} == {wanted}
 
     pattern = order("coffee", None, Outputs(tmp_path / "{name} new.tif", stats=tmp_path / "{name}.json"))
     (one,) = spread(pattern, [Path("x/e.png")])

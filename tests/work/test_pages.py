@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import struct
 import subprocess
 from collections.abc import Callable
 from fractions import Fraction
@@ -18,7 +19,7 @@ from PIL import Image
 
 from app.errors import UserError
 from app.media.clip import CHANGED
-from app.media.codecs import pillow, tiff
+from app.media.codecs import pillow, tiff, webp
 from app.media.displacement import Displacement
 from app.media.maps import write_map
 from app.media.source import open_source
@@ -117,6 +118,14 @@ def test_durations_of_webp_are_kept(device: Device, tmp_path: Path):
     source = animated(tmp_path / "a.webp", loop=0)
     applied(device, tmp_path, source, "b.webp", animated=True)
     assert shown(tmp_path / "b.webp")[1] == DURATIONS
+    # What is said of all of it comes before its frames; whatever comes after them is passed over.
+    later = b"".join(
+        kind + struct.pack("<I", len(body)) + body
+        for kind, body in ((b"ANIM", bytes([0, 0, 0, 0, 7, 0])), (b"VP8X", bytes(10)))
+    )
+    whole = webp.frames(source.read_bytes())
+    assert whole is not None
+    assert webp.frames(source.read_bytes() + later) == whole
 
 
 @pytest.mark.parametrize(("given", "plays"), [({"loop": 0}, 0), ({"loop": 3}, 3), ({}, None)])

@@ -915,8 +915,12 @@ def test_what_is_offered_is_told_beside_its_buttons_also_in_a_small_window(
 
     plain = Ui.dim
     monkeypatch.setattr(Ui, "dim", dim)
-    robot.scale, robot.size = 2.0, (800, 520)
-    robot.frame(count=4)
+    sizes = list[tuple[float, float]]()
+    for scale in (1.0, 2.0):
+        robot.scale, robot.size = scale, (round(400 * scale), round(260 * scale))
+        robot.frame(count=4)
+        sizes.append((offer_of(robot).rect.width, offer_of(robot).rect.height))
+    assert np.multiply(sizes[0], 2) == pytest.approx(sizes[1], abs=1.0)  # the room around it too
     assert told
     assert max(told.values()) <= min(widgets.at["Discard"].x, widgets.at["Restore"].x)
 
@@ -955,11 +959,19 @@ def test_restored_work_is_as_it_was_and_unsaved(
 
 
 @pytest.mark.usefixtures("before")
-def test_of_several_works_the_one_whose_button_is_pressed_is_restored(starter: Starter, tmp_path: Path) -> None:
+def test_of_several_works_the_one_whose_button_is_pressed_is_restored(
+    starter: Starter, tmp_path: Path, root: Path
+) -> None:
     robot = starter.start(tmp_path)
     answer(robot, "Later")
     robot.drag((0.3, 0.4), (0.45, 0.4))
     robot.rest()
+    robot = starter.start(tmp_path)
+    answer(robot, "Later")
+    found, _ = find(root)
+    assert len(found) == 2  # nobody holds any of them
+    for each in found:
+        each.leave()
     robot = starter.start(tmp_path)
     answer(robot, "Restore")  # the first row: the newest
     assert robot.editor.dialogs.shown == []
