@@ -243,7 +243,8 @@ class Scheme(ABC):
     def stream_function(self) -> np.ndarray:
         """psi at the cells' corners with u = dpsi/dy and v = -dpsi/dx, (ny + 1, nx + 1) float32, lengths^2 / s.
 
-        Zero at the walls. It describes the whole flow unless a brush's source has acted in the last step.
+        Zero at the walls. It describes the whole flow where that is free of divergence: not after a brush's source, and
+        not between single stages and `project`.
         """
         return np.pad(np.cumsum(self.u * np.float32(self.grid.spacing[1]), axis=0), ((1, 0), (0, 0)))
 

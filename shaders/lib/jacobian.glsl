@@ -87,7 +87,7 @@ void undo(sampler2D undone, vec4 box, vec4 edges, vec2 x, inout Bend bend) {
     mat2 aside = mat2(slopes[0].rg, slopes[1].rg), bent = bend.jacobian - mat2(1.0);
     vec2 growing = vec2(slopes[0].b, slopes[1].b) * float(read.b > 0.0 && read.b < 1.0);
     float kept = 1.0 - clamp(read.b, 0.0, 1.0), left = bend.part * kept;
-    vec2 fading = bend.fading * kept - bend.part * growing, moved = bend.moved + read.rg;
+    vec2 fading = bend.fading * kept - bend.part * growing, moved = bend.moved + clamp(read.rg, -u_picture, u_picture);
     bend.back += bend.part * bend.moved - left * moved;
     bend.bent_back += outerProduct(bend.moved, bend.fading) + bend.part * bent;
     bend.bent_back -= outerProduct(moved, fading) + left * (bent + aside);

@@ -225,10 +225,11 @@ void follow(sampler2D closed, vec4 box, vec4 edges, vec2 x, inout vec2 moved, in
 }
 
 // What the restore brush has undone at a place in A's texels: a way (E), and the part of what follows (T). E is read as A is,
-// so that beneath the brush they add up to what A was also between texels.
+// so that beneath the brush they add up to what A was also between texels. It leads from one place of the picture to another,
+// and is kept as short as that: a polynomial overshoots, and E would grow from remap to remap.
 vec3 undone_at(sampler2D undone, vec4 box, vec4 edges, vec2 place) {
     vec3 read = closed_texels(undone, box, edges, place).rgb;
-    return vec3(read.rg, clamp(read.b, 0.0, 1.0));
+    return vec3(clamp(read.rg, -u_picture, u_picture), clamp(read.b, 0.0, 1.0));
 }
 
 // Where x is led on to and D(x) are two things once something is undone: D(x) = back + part (x led to - x). Undoing leaves

@@ -68,7 +68,8 @@ class Tip:
             for number in places:
                 check_type("a number of a brush", number)
             if not all(abs(place) <= FARTHEST for place in places):
-                raise ValueError(f"a brush from {start} to {end} is off the picture by more than {FARTHEST:g} sides")
+                ends = "a brush from ({:g}, {:g}) to ({:g}, {:g})".format(*map(float, places))
+                raise ValueError(f"{ends} is off the picture by more than {FARTHEST:g} sides")
         if len(self.paths) > MOST_IMAGES:
             raise ValueError(f"a brush with {len(self.paths)} images was given; it must be at most {MOST_IMAGES}")
         for number in (self.radius, self.hardness):

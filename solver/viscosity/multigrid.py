@@ -252,9 +252,7 @@ class Multigrid:
         largest = LARGEST_EIGENVALUE[1 if level.stencil else 0]
         return chebyshev_weights(largest / SMOOTHED[self._sweeps], largest, self._sweeps)
 
-    def smooth(
-        self, level: Level, rhs: PackedFaces, weights: list[float], start: PackedFaces | None = None
-    ) -> None:  # fmt: skip
+    def smooth(self, level: Level, rhs: PackedFaces, weights: list[float], start: PackedFaces | None = None) -> None:
         """One sweep for each weight, on from the level's iterate or from `start`."""
         smooth = self.device.pass_("viscosity/smooth.frag", **level.defines)
         for weight in weights:

@@ -238,6 +238,10 @@ WRONG: dict[str, tuple[Callable[[Any], object], str]] = {
         lambda fluid: PaperWarpMap(fluid.device, fluid.grid).advance_prescribed(np.full((12, 20, 2), 3e38), 1e4),
         "beyond",
     ),
+    "a brush far off, by NumPy's numbers": (
+        lambda fluid: Tip((np.float64(1e300), np.float64(2)), (0, 0), 0.1),
+        r"from \(1e\+300, 2\) to \(0, 0\)",
+    ),
     "an endless growth": (lambda fluid: Brush(fluid.device).expand(fluid, Tip((0, 0), (0, 0), 0.1), np.inf), "rate"),
 }
 

@@ -1375,6 +1375,22 @@ def test_what_is_restored_of_closed_maps_goes_on_with_the_flow(device: Device) -
         made.release()
 
 
+def test_what_is_undone_of_closed_maps_stays_bounded_however_it_is_stirred_on(device: Device) -> None:
+    """E of (S9) leads from one place of the picture to another; a polynomial that overshoots must not amplify it."""
+    rng = np.random.default_rng(0)
+    warp = WarpMap(device, Grid(24, 16))
+    for _ in range(60):
+        a, b = rng.normal(0, 1, 2)
+        warp.advance_prescribed(lambda x, y, t, a=a, b=b: (a * np.sin(9 * y + a), b * np.sin(7 * x + b)), 0.5)
+        warp.restore_under(tuple(rng.random(2) * warp.extent), 0.2, 0.5, 0.5)
+    state = warp.save()
+    undone = [a for name, a in state.arrays().items() if name.startswith("undone") and name.endswith("texels")]
+    assert undone
+    assert all(np.abs(texels[..., :2]).max(initial=0.0) <= 2.0 for texels in undone), "1 and what the last stroke took"
+    for made in (state, warp):
+        made.release()
+
+
 def test_the_slopes_of_what_is_restored_are_right_where_it_is_carried_on(device: Device) -> None:
     """Against differences, at a sharp edge: there the cubic leads places on also where it takes no part away."""
     warp, flow = wound_up(device, 6.0), swirl((0.45, 0.5), 0.3)
