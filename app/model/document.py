@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from app.model.recipe import Recipe
+from app.model.strokes import Stroke
 from app.model.undo import History
+from app.model.windows import on_grid
 
 
 class Document:
@@ -30,8 +32,9 @@ class Document:
 
     def simulate_on(self, cells: int) -> None:
         """Let all states of the work be simulated on another grid: no edit, nothing to undo and nothing to save."""
-        self.history.replace_all(lambda recipe: recipe.on_grid(cells))
-        self._saved = self._saved.on_grid(cells)
+        made = dict[tuple[int, int], Stroke]()
+        self.history.replace_all(lambda recipe: on_grid(recipe, cells, made))
+        self._saved = on_grid(self._saved, cells)
 
     @property
     def saved_recipe(self) -> Recipe:

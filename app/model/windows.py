@@ -17,7 +17,7 @@ import numpy as np
 from app.model.handles import RecipeHandle, RecipePin, reach_of
 from app.model.recipe import FluidSettings, Recipe
 from app.model.sampling import Point
-from app.model.strokes import FINEST_DETAIL, Act
+from app.model.strokes import FINEST_DETAIL, Act, Stroke
 from solver.grid import SMALLEST_GRID, Grid
 
 CELLS = 192  # along a side of a window; its levels divide it by two down to three
@@ -77,6 +77,27 @@ def with_detail(led: SomeLed, recipe: Recipe, extent: Point) -> SomeLed:
     """A handle or a pin of a recipe with the detail that it deserves where it begins."""
     settings = recipe.fluid_at(led.first_tick(recipe.fluid.dt))
     return led.model_copy(update={"detail": detail_for_led(reach_of(led, extent), recipe, settings)})
+
+
+def on_grid(recipe: Recipe, cells: int, made: dict[tuple[int, int], Stroke] | None = None) -> Recipe:
+    """The recipe on a grid that nobody has chosen: on coarser cells more brushes are small, and get windows.
+
+    Args:
+        recipe: whose strokes were made on its own grid.
+        cells: along the longer side, from now on.
+        made: the strokes that have changed, by what they were; of several recipes, they go on sharing them.
+    """
+    moved, made = recipe.on_grid(cells), {} if made is None else made
+    if cells >= recipe.fluid.grid:
+        return moved
+
+    def finer(stroke: Stroke) -> Stroke:
+        if stroke.detail or stroke.tool not in FLOWING or stroke.symmetry != "none":
+            return stroke
+        detail = detail_for(stroke.radius, moved, moved.fluid_at(stroke.first_tick))
+        return made.setdefault((id(stroke), detail), stroke.model_copy(update={"detail": detail})) if detail else stroke
+
+    return moved.edited(stroke=tuple(map(finer, recipe.stroke)))
 
 
 def _fades_soon(settings: FluidSettings, squared_wavenumber: float) -> bool:

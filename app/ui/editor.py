@@ -291,6 +291,7 @@ class Editor:
             self.ui.palette = theme.PALETTES[self.preferences.theme]
             theme.apply(self.ui.palette, self.ui.scale)
         self.layout = self._layout(*size)
+        self.state.fit_brushes(self.canvas.size)
         self.workspace.view = replace(self.view, canvas=self.layout.canvas, density=density)
 
     def _layout(self, width: float, height: float) -> Layout:

@@ -64,7 +64,8 @@ class EditorState:
         tool_name: the tool in hand.
         tool_seen: the one that the strip was scrolled to last.
         brushes: of the tools for which something has been set, by their names.
-        suited: how local pushes have been made for the fluid of the work that is open; None for one that is no feel.
+        smallest: radius of the smallest brush, longer sides: less than a pixel of the picture across is not seen.
+        suited: how local pushes have been made for the last fluid that was a feel.
         stabiliser: points of the screen, of the string that the pen pulls the brush by; 0 is none.
         preset_name: that has been typed for the brush, to keep it by.
         opposite: tools that are switched to their other direction.
@@ -97,7 +98,8 @@ class EditorState:
     tool_name: str = "push"
     tool_seen: str = ""
     brushes: dict[str, BrushSettings] = field(default_factory=dict)
-    suited: float | None = None
+    smallest: float = SMALLEST
+    suited: float = BrushSettings.local
     stabiliser: float = 0.0
     preset_name: str = ""
     opposite: dict[str, bool] = field(default_factory=dict)
@@ -134,14 +136,14 @@ class EditorState:
         state = cls(
             inspector=likes.inspector, auto_quality=likes.auto_quality, stabiliser=likes.stabiliser, lanes=lanes
         )
-        state.sections = dict(likes.sections)
+        state.sections, state.suited = dict(likes.sections), likes.suited
         state.brushes = {name: _within(brush) for name, brush in likes.brushes.items() if name in TOOL}
         return state
 
     def remember(self, likes: Preferences) -> None:
         """Take note in the preferences of what `recalled` takes from them."""
         likes.stabiliser, likes.sections = self.stabiliser, dict(self.sections)
-        likes.lanes_height = self.lanes.height
+        likes.lanes_height, likes.suited = self.lanes.height, self.suited
         likes.brushes = {name: asdict(brush) for name, brush in self.brushes.items()}
 
     @property
@@ -151,7 +153,8 @@ class EditorState:
     @property
     def brush(self) -> BrushSettings:
         """That of the tool in hand: each has its own."""
-        return self.brushes.get(self.tool_name, BrushSettings())
+        brush = self.brushes.get(self.tool_name, BrushSettings())
+        return replace(brush, radius=max(brush.radius, self.smallest))
 
     @brush.setter
     def brush(self, brush: BrushSettings) -> None:
@@ -173,11 +176,9 @@ class EditorState:
 
         What a person has set stays if it is another part, or if the fluid is as that of the work before.
         """
-        best = next((feel.local for feel in FEELS if feel.fits(fluid)), None)
+        best = next((feel.local for feel in FEELS if feel.fits(fluid)), self.suited)
         before, self.suited = self.suited, best
-        if best is None or best == before:
-            return
-        if {brush.local for brush in self.brushes.values()} <= {feel.local for feel in FEELS}:
+        if best != before and {brush.local for brush in self.brushes.values()} <= {feel.local for feel in FEELS}:
             self.make_local(best)
 
     @property
@@ -194,8 +195,12 @@ class EditorState:
         if self.tool.directions:
             self.opposite[name] = opposite
 
+    def fit_brushes(self, size: tuple[int, int]) -> None:
+        """Let them be no smaller than is seen in a picture of (width, height) pixels."""
+        self.smallest = max(SMALLEST, 0.5 / max(size))
+
     def resize_brush(self, factor: float) -> None:
-        self._set_brush(radius=min(max(self.brush.radius * factor, SMALLEST), LARGEST))
+        self._set_brush(radius=min(max(self.brush.radius * factor, self.smallest), LARGEST))
 
     def harden_brush(self, by: float) -> None:
         self._set_brush(hardness=round(min(max(self.brush.hardness + by, 0.0), 1.0), 3))

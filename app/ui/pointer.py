@@ -15,7 +15,7 @@ from app.model.sampling import Point
 from app.model.tools import Press
 from app.ui.clock import TWICE
 from app.ui.dialogs import Dialogs
-from app.ui.editor_state import LARGEST, SMALLEST, EditorState
+from app.ui.editor_state import LARGEST, EditorState
 from app.ui.events import LEFT, MIDDLE, RIGHT, Button, Event, Key, Mods, Move, Wheel
 from app.ui.preferences import Preferences
 from app.ui.selecting import Selecting
@@ -231,7 +231,7 @@ class PointerController:
             case "zoom":
                 workspace.view = view.zoomed((view.zoom or view.fit_zoom) * exp(0.008 * dx), *self._start)
             case "brush":
-                radius = min(max(brush.radius + dx / view.longer, SMALLEST), LARGEST)
+                radius = min(max(brush.radius + dx / view.longer, self.state.smallest), LARGEST)
                 hardness = min(max(brush.hardness - dy * 0.004, 0.0), 1.0)
                 self.state.brush = replace(brush, radius=radius, hardness=hardness)
             case "split":

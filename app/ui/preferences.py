@@ -41,6 +41,7 @@ class Preferences:
         brushes: of each tool, by its name; `presets`: the person's own brushes, by theirs.
         lanes_height: points of the design.
         stabiliser: points of the screen, of the string that the pen pulls the brush by.
+        suited: how local pushes were made for a fluid; see `EditorState`.
     """
 
     theme: str = "dark"
@@ -62,6 +63,7 @@ class Preferences:
     brushes: dict[str, dict[str, float]] = field(default_factory=dict)
     presets: dict[str, dict[str, float]] = field(default_factory=dict)
     stabiliser: float = 0.0
+    suited: float = 0.0
     path: Path | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
@@ -90,6 +92,7 @@ class Preferences:
         kept.scale = min(max(kept.scale, 0.75), 3.0) if math.isfinite(kept.scale) else 1.0
         kept.recent = [str(name) for name in kept.recent][:MOST_RECENT]
         kept.stabiliser = min(max(kept.stabiliser, 0.0), LONGEST_STRING) if math.isfinite(kept.stabiliser) else 0.0
+        kept.suited = min(max(kept.suited, 0.0), 1.0) if math.isfinite(kept.suited) else 0.0
         tall = kept.lanes_height
         kept.lanes_height = min(max(tall, LEAST_LANES), TALLEST_LANES) if math.isfinite(tall) else LANES
         is_place = len(kept.window) == 5 and all(isinstance(n, int) and abs(n) < MOST_PIXELS for n in kept.window)

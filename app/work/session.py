@@ -15,6 +15,7 @@ import numpy as np
 
 from app.media.project import Project
 from app.model.handles import ARRIVED, MOST_OBJECTIONS, objections
+from app.model.windows import on_grid
 from app.work.handle_status import FIT, Held, Unmet, as_seen, held_in, unmet
 from app.work.playing import Playing
 from app.work.recording import BUDGET
@@ -128,7 +129,7 @@ class Session(Playing):
 
         Until then everything stays as it is, and also then it is no edit.
         """
-        recipe, start = self._live.on_grid(cells), time.perf_counter()
+        recipe, start = on_grid(self._live, cells), time.perf_counter()
         if self._prepared is not None and not recipe.is_set_up_as(self._prepared.recipe):
             self.forget_grid()
         if self._prepared is None:
@@ -148,7 +149,7 @@ class Session(Playing):
         self.replay.release()
         self.replay, self._prepared = prepared, None
         self.document.simulate_on(cells)
-        self._base, self._live = self._base.on_grid(cells), recipe
+        self._base, self._live = on_grid(self._base, cells), recipe
         self.changes += 1
         return True
 
@@ -179,7 +180,7 @@ class Session(Playing):
             said = "less of the past is kept now, and going back takes longer."
         elif cells >= COARSEST:
             self.document.simulate_on(cells)
-            self._base, self._live = self._base.on_grid(cells), self._live.on_grid(cells)
+            self._base, self._live = on_grid(self._base, cells), on_grid(self._live, cells)
             said = f"the simulation goes on with {cells} cells."
         else:
             raise MemoryError

@@ -35,6 +35,7 @@ from app.model.schema import frozen
 from app.model.strokes import Stroke
 from app.model.tools import TOOL, TOOLS, BrushSettings, Press
 from app.model.undo import Entry
+from app.model.windows import on_grid
 from app.ui.files import fresh_recipe
 from app.work.recovery import Found, Journal, find
 from app.work.replay import Replay
@@ -372,8 +373,8 @@ class Work(RuleBasedStateMachine):
         work.settle()
         self._went_on()
         assert work.prepare_grid(cells, AGES)
-        self.entries = [replace(entry, recipe=entry.recipe.on_grid(cells)) for entry in self.entries]
-        self.saved = self.saved.on_grid(cells)
+        self.entries = [replace(entry, recipe=on_grid(entry.recipe, cells)) for entry in self.entries]
+        self.saved = on_grid(self.saved, cells)
         self._look()
 
     @rule(part=PARTS, ticks=st.integers(0, 3), plays=st.booleans(), steps=st.booleans())

@@ -12,11 +12,15 @@ import numpy as np
 import pytest
 
 from app.gallery import retouching
+from app.media.pictures import write_picture
+from app.media.project import from_picture
 from app.model.presets import BRUSHES
-from app.ui.editor_state import LIMITS, EditorState, presets
+from app.ui.editor_state import LIMITS, SMALLEST, EditorState, presets
+from app.ui.events import RIGHT
+from app.ui.files import fresh_recipe
 from app.ui.preferences import Preferences
 from solver.gl.device import Device
-from support.editing import Robot, small_project
+from support.editing import Robot, pattern, small_project
 from support.widgets import Widgets
 
 
@@ -102,6 +106,25 @@ def test_a_brush_can_be_as_small_as_those_of_the_guide(name: str) -> None:
     least, most = LIMITS["radius"]
     for stroke in retouching.load(name).stroke:
         assert least <= stroke.radius <= most
+
+
+def test_a_brush_is_not_smaller_than_a_pixel(device: Device, tmp_path: Path) -> None:
+    """On a picture of 32 it could be of .064, and the brush of a larger picture was; a flick went on for 17 s."""
+    write_picture(tmp_path / "small.png", pattern(32, 20))
+    with Robot(device, from_picture(tmp_path / "small.png", fresh_recipe())) as robot:
+        state, view = robot.editor.state, robot.editor.view
+        state.brush = replace(state.brush, radius=SMALLEST)
+        assert state.brush.radius == 0.5 / 32
+        for _ in range(2):
+            robot.key("[")
+        assert state.brush.radius == 0.5 / 32
+        robot.move(*robot.at(0.5, 0.5))
+        robot.press(RIGHT)
+        robot.move(view.rect.x, robot.at(0.5, 0.5)[1])
+        robot.release(RIGHT)
+        assert state.brush.radius == 0.5 / 32
+        robot.drag((0.1, 0.5), (0.9, 0.5), 1)
+        assert robot.editor.session.recipe.stroke[-1].last_tick < 60
 
 
 def test_the_ring_of_a_stroke_under_way_is_as_large_as_its_brush(robot: Robot) -> None:

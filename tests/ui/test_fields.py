@@ -23,6 +23,7 @@ from app.model.presets import PUTTY
 from app.model.recipe import Output
 from app.model.strokes import BrushPath, Change
 from app.progress import Progress
+from app.ui.editor_state import EditorState
 from app.ui.events import LEFT, Button, Move
 from app.ui.export_choices import ANIMATION, KINDS, MAP, PICTURE, PICTURES, PRESETS
 from app.ui.export_dialog import ExportDialog
@@ -185,6 +186,12 @@ def test_a_work_that_is_opened_makes_pushes_as_local_as_its_fluid_wants(robot: R
         state.brush = replace(state.brush, local=local)
         robot.editor.open(project)
         assert state.brush.local == local, "set by hand"
+    state.make_local(1.0)
+    state.brush = replace(state.brush, local=0.0)
+    robot.editor.remember()
+    after = EditorState.recalled(robot.editor.preferences)
+    after.suit(fluid)
+    assert after.brush.local == 0.0, "set by hand before the start"
 
 
 def test_every_kind_of_edge_of_the_picture_is_what_it_is_called(robot: Robot, widgets: Widgets) -> None:
@@ -747,10 +754,10 @@ opacity velocity, Opacity: 0% to 100%, 70%
 opacity forces, Opacity: 0% to 100%, 70%
 mask reach, By: 0.24 px to 60 px by ratios, 4.8 px
 amount, Amount: 0% to 150%, 100%
-radius, Size: 0.48 px to 240 px by ratios, 72 px
+radius, Size: 1 px to 240 px by ratios, 72 px
 stiffness, Stiffness: 1% to 100%, 100%
 local, Local: 0% to 100%, 0%
-held radius, Size: 0.48 px to 480 px by ratios, 72 px
+held radius, Size: 1 px to 480 px by ratios, 72 px
 held stiffness, Stiffness: 1% to 100%, 100%
 held local, Local: 0% to 100%, 0%
 held rotate, Rotate: -180° to 180°, 0°

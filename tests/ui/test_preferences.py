@@ -18,7 +18,7 @@ OTHER: dict[str, Any] = {
     "embed": False, "hint": False, "recent": ["/b", "/a"], "folder": "/some", "export_folder": "/where",
     "export_as": ".mp4", "names": True, "sections": {"View": False}, "window": [10, 20, 800, 600, 1],
     "keys": {"undo": ["ctrl+b"]}, "brushes": {"push": {"radius": 0.25}}, "presets": {"Mine": {"hardness": 0.5}},
-    "stabiliser": 40.0,
+    "stabiliser": 40.0, "suited": 1.0,
 }  # fmt: skip
 """A value of each part that is not its default."""
 
@@ -62,6 +62,8 @@ def test_of_a_part_of_another_kind_nothing_is_taken_and_of_the_others_all(file: 
         ("stabiliser", -3.0, 0.0),
         ("stabiliser", 201.0, 200.0),
         ("stabiliser", float("nan"), 0.0),
+        ("suited", 3.0, 1.0),
+        ("suited", float("nan"), 0.0),
         ("lanes_height", 10.0, 76.0),
         ("lanes_height", 5e3, 1200.0),
         ("lanes_height", float("nan"), 156.0),

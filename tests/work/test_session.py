@@ -719,6 +719,30 @@ def test_whatever_is_done_while_strokes_wait_the_recipe_is_what_is_seen(
     assert np.array_equal(session.replay.warp.read(), seen)
 
 
+def test_a_coarser_grid_makes_no_stroke_coarser(session: Session) -> None:
+    """Nobody has chosen it: of 20 cells a brush's radius 7 were left, and a lip that went 97 pixels went 90."""
+    session.begin_with(grid=80, viscosity=PUTTY.viscosity, drag=PUTTY.drag)
+    for y in (0.4, 0.6):
+        paint(session, "push", (0.4, y), (0.6, y))
+        session.settle()
+    before = session.replay.warp.read((120, 90))
+    assert [stroke.detail for stroke in session.recipe.stroke] == [0, 0], "fine enough on the whole picture"
+    while not session.prepare_grid(24, 1.0):
+        pass
+    assert session.recipe.stroke[0].detail > 80
+    assert np.abs(session.replay.warp.read((120, 90)) - before).max() < 0.02 * np.abs(before).max()
+    first, second, third = (entry.recipe.stroke for entry in session.document.history.entries)
+    assert (len(first), len(second), len(third)) == (0, 1, 2)
+    assert second[0] is third[0], "what entries share is held once"
+    after = session.replay.warp.read()
+    session.undo()
+    session.settle()
+    session.redo()
+    session.settle()
+    assert np.array_equal(session.replay.warp.read(), after)
+    assert session.recipe == session.document.recipe
+
+
 def test_a_grid_that_is_not_wanted_any_more_has_nothing_on_the_gpu(
     session: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:

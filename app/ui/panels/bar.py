@@ -176,6 +176,7 @@ def _slider(ui: Ui, workspace: Workspace, state: EditorState, setting: Setting, 
     value: float = getattr(brush, setting.name)
     unit = picture_pixels(2 * max(workspace.canvas.size)) if is_size else PERCENT
     low, high = LIMITS[setting.name]
+    low = state.smallest if is_size else low
     raises = f"{ui.shown(setting.raises)}: more. " if ui.shown(setting.raises) else ""
     slid = ui.slider(
         setting.name, setting.label, value, low, high, unit, getattr(DEFAULTS, setting.name),

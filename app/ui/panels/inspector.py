@@ -21,7 +21,7 @@ from app.model.presets import DEFAULT
 from app.model.strokes import Symmetry
 from app.ui.actions import ACTIONS, Do
 from app.ui.clock import Clock
-from app.ui.editor_state import SELECT_BY, SMALLEST, EditorState
+from app.ui.editor_state import SELECT_BY, EditorState
 from app.ui.panels import feels, selected_bar
 from app.ui.quality import Quality
 from app.ui.selecting import Selecting
@@ -179,7 +179,7 @@ def _handles(ui: Ui, workspace: Workspace, state: EditorState, do: Do) -> None:
             imgui.new_line()
         ui.dim(words)
         slid = ui.slider(
-            "held radius", "Size", led.radius, SMALLEST, 1.0, pixels, 0.15, logarithmic=True,
+            "held radius", "Size", led.radius, state.smallest, 1.0, pixels, 0.15, logarithmic=True,
             title="How far across it reaches", more="It goes at most that far.",
         )  # fmt: skip
         _set_held(session, label, f"Size of a {led.kind}", slid, radius=slid.value)
