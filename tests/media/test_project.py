@@ -17,7 +17,7 @@ from app.errors import UserError
 from app.media import project as projects
 from app.media.opening import open_recipe
 from app.media.pictures import write_picture
-from app.media.project import Project
+from app.media.project import Project, picture_names
 from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.model.strokes import Stroke
@@ -188,10 +188,10 @@ def test_a_picture_that_is_called_as_another_part_of_a_project_takes_no_ones_pla
     masked = Project(made.recipe.edited(viscosity=words.viscosity), made.picture, made.data, tmp_path / "masks")
     projects.save(masked, tmp_path / "work.fluidwarp")
     loaded = projects.load(tmp_path / "work.fluidwarp")
-    (layer,) = loaded.recipe.viscosity
+    (mask,) = (each for each in picture_names(loaded.recipe) if each != loaded.recipe.picture)
     assert loaded.recipe.stroke == made.recipe.stroke
     assert np.array_equal(loaded.picture.pixels, made.picture.pixels)
-    assert (loaded.folder / layer.picture).read_bytes() == (tmp_path / "masks" / name).read_bytes()
+    assert (loaded.folder / mask).read_bytes() == (tmp_path / "masks" / name).read_bytes()
 
 
 def renamed(project: Project, name: str) -> Project:
