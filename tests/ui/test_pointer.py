@@ -123,7 +123,7 @@ def test_the_right_button_sets_the_brush_where_it_stays(robot: Robot) -> None:
     robot.move(point[0] - 6, point[1] + 25)
     assert state.brush == replace(before, radius=pytest.approx(0.1 - 6 / 240), hardness=pytest.approx(0.2))
     robot.move(point[0] - 2000, point[1] + 2000)
-    assert (state.brush.radius, state.brush.hardness) == (0.001, 0)
+    assert (state.brush.radius, state.brush.hardness) == (0.5 / 240, 0)
     robot.move(point[0] + 2000, point[1] - 2000)
     assert (state.brush.radius, state.brush.hardness) == (0.5, 1)
     robot.release(RIGHT)
