@@ -1079,8 +1079,16 @@ def test_what_was_not_restored_yet_is_offered_again(
     starter: Starter, tmp_path: Path, root: Path, monkeypatch: pytest.MonkeyPatch, way: str
 ) -> None:
     """To who has left, or wanted something else, before its picture had been read."""
-    goes_on, load = threading.Event(), Found.load
-    monkeypatch.setattr(Found, "load", lambda found: (goes_on.wait(60), load(found))[1])
+    goes_on, has_ended, load = threading.Event(), threading.Event(), Found.load
+
+    def later(found: Found) -> Project:
+        goes_on.wait(60)
+        try:
+            return load(found)
+        finally:
+            has_ended.set()
+
+    monkeypatch.setattr(Found, "load", later)
     robot = starter.start(tmp_path)
     (offered,) = robot.editor.recovery.offered
     robot.editor.recovery.restore(offered)
@@ -1094,6 +1102,7 @@ def test_what_was_not_restored_yet_is_offered_again(
         robot.editor.files.open(tmp_path / "pattern.png")
     assert found_in(root).work.strokes == 2
     goes_on.set()
+    assert has_ended.wait(60)  # or it would still read the picture when no file may be open
 
 
 @pytest.mark.usefixtures("before")
