@@ -87,9 +87,11 @@ class Cautions:
         new = [held for held in session.held if held.label not in self._held_back and _is_over(session, held)]
         if new:
             self._held_back |= {held.label for held in new}
+            led = _led(session)
             self._messages.caution(
                 f"{heading(new[0].label)} holds its place, so that the stroke moves less there. "
-                "To push it freely, mute or remove it first."
+                "To push it freely, mute or remove it first.",
+                lambda: session is self._workspace.session and _led(session) == led,
             )
 
 
