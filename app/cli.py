@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 def _is_sequence(name: str) -> bool:
-    from app.media.files import is_sequence
+    from app.media.numbered import is_sequence
 
     return is_sequence(name)
 
@@ -450,7 +450,7 @@ def _perform_many(tasks: Sequence[Piece], jobs: int, cluster: str | None, verbos
 
 def _named(failed: Sequence[Outcome], verbose: bool) -> str:
     """Which of several have failed, and, unless it is told, whether what is told of the first goes for all of them."""
-    from app.media.files import listed
+    from app.media.numbered import listed
 
     if len(failed) == 1:
         return ""

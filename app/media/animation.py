@@ -24,7 +24,8 @@ from app.media import ffmpeg
 from app.media.clip import USUAL, Colours
 from app.media.depth import to_bits
 from app.media.encoders import ANIMATIONS, SIX_BITS, Container, Encoding, Stream, check_animation, lossless
-from app.media.files import cannot_write, is_sequence, numbered, replacing, temporary_beside, temporary_file
+from app.media.files import cannot_write, replacing, temporary_beside, temporary_file
+from app.media.numbered import is_sequence, numbered
 from app.media.pictures import write_picture
 from app.media.video import sound_tracks
 from app.model.picture import Picture

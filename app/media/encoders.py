@@ -12,9 +12,10 @@ from pathlib import Path
 from app.errors import UserError
 from app.media import ffmpeg
 from app.media.clip import USUAL, Clip, Colours, uncoded
-from app.media.files import NUMBER, is_sequence, writable
+from app.media.files import writable
 from app.media.formats import FORMATS, check_picture_output, fits_profile
 from app.media.losses import lost, unusual_colours
+from app.media.numbered import NUMBER, is_sequence
 from app.media.video import NAMES, WHITE
 from app.model.picture import Picture
 

@@ -20,9 +20,9 @@ from app.media.codecs.exr import unusual_attributes
 from app.media.codecs.metadata import profile_name, tag_names
 from app.media.depth import as_half, to_bits
 from app.media.encoders import ANIMATIONS, Stream, check_colours_of_picture, depth_of, has_alpha
-from app.media.files import is_sequence
 from app.media.formats import Format, fits_profile, is_srgb, picture_format, written_depth
 from app.media.losses import REC709, counted, few
+from app.media.numbered import is_sequence
 from app.model.picture import Picture, srgb_to_linear, unpremultiplied
 
 PNG_STEP = png.METRE  # PNG tells whole dots a metre, and no 72 an inch

@@ -14,9 +14,10 @@ from typing import Any
 
 from app.errors import UserError, printable, shown
 from app.media.clip import WHOLE, Clip
-from app.media.files import check_kept, is_sequence, name_from, numbered_files, replacing
+from app.media.files import check_kept, name_from, replacing
 from app.media.inputs import MAX_PIXELS, MOST_TEXT, Archive, cannot_read, open_input, read_input, state_of
 from app.media.leftovers import temporary_folder
+from app.media.numbered import is_sequence, numbered_files
 from app.media.recipes import read_recipe
 from app.media.source import Source, open_source
 from app.model.picture import Picture

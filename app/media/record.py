@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 
 from app.errors import UserError
-from app.media.files import cannot_write, numbered
+from app.media.files import cannot_write
 from app.media.inputs import open_input, read_input
+from app.media.numbered import numbered
 
 ONLY_A_FILE = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)  # no link, and no pipe that nobody reads
 MOST = 256 * 2**20  # bytes of a record: two million frames

@@ -10,9 +10,9 @@ from pathlib import Path
 
 from app.errors import Cancelled, UserError
 from app.media.clip import DEEP, SHALLOW, WHOLE, Clip, FrameRange
-from app.media.files import NUMBER, check_numbers, numbered_files
 from app.media.inputs import MAX_PIXELS
 from app.media.losses import lost
+from app.media.numbered import NUMBER, check_numbers, numbered_files
 from app.media.pictures import read_picture
 from app.media.record import digest_of_file
 from app.model.picture import Picture

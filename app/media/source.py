@@ -8,10 +8,10 @@ from pathlib import Path
 
 from app.errors import UserError
 from app.media.clip import Clip, coded
-from app.media.files import stands_for_files
 from app.media.formats import ENDINGS
 from app.media.inputs import MAX_PIXELS
 from app.media.losses import lost
+from app.media.numbered import stands_for_files
 from app.media.pages import read_pages
 from app.media.pictures import read_picture
 from app.media.sequence import read_sequence

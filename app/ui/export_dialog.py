@@ -22,9 +22,9 @@ from imgui_bundle.imgui import ImVec2
 from app.errors import UserError, printable
 from app.media.clip import WHOLE, FrameRange, rate_of
 from app.media.encoders import written_size
-from app.media.files import is_sequence, is_there
 from app.media.formats import FORMATS
 from app.media.leftovers import temporary_folder
+from app.media.numbered import is_sequence, is_there
 from app.media.pictures import read_picture
 from app.media.project import check_pictures_kept
 from app.model.handles import heading

@@ -18,9 +18,10 @@ from imgui_bundle import imgui
 from app.errors import UserError
 from app.media import project as projects
 from app.media.clip import rate_of
-from app.media.files import in_text, sequence_of
+from app.media.files import in_text
 from app.media.landmarks import ENDINGS
 from app.media.maps import MAP_ENDINGS, holds
+from app.media.numbered import sequence_of
 from app.media.opening import check_picture
 from app.media.outlines import outline
 from app.media.pictures import write_picture

@@ -15,7 +15,7 @@ import glfw
 import moderngl
 
 from app.errors import UserError
-from app.media.files import is_sequence
+from app.media.numbered import is_sequence
 from app.progress import interruptible, never
 from app.ui.editor import Editor
 from app.ui.events import Button, CloseWish, Drop, Event, Focus, Key, Mods, Move, Text, Wheel

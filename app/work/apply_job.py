@@ -17,11 +17,12 @@ from app.media.animation import Frame, animation_writer
 from app.media.clip import WHOLE, rate_of
 from app.media.displacement import Displacement, PixelPlaces, cropped, folds
 from app.media.encoders import check_colours, check_colours_of_picture, check_output, passes, unheld_of_clip
-from app.media.files import check_kept, check_numbers, is_sequence, noticing, numbered_files, stands_for_files, writable
+from app.media.files import check_kept, noticing, writable
 from app.media.formats import picture_format
 from app.media.holding import Losses, Written
 from app.media.inputs import MAX_PIXELS
 from app.media.maps import Kind, read_map, telling_of
+from app.media.numbered import check_numbers, is_sequence, numbered_files, stands_for_files
 from app.media.record import Record, digest_of, digest_of_file
 from app.media.source import Source, open_source
 from app.model.picture import Picture

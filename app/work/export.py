@@ -25,10 +25,11 @@ from app.media.clip import frame_of
 from app.media.depth import mixed
 from app.media.displacement import Displacement
 from app.media.encoders import passes, unheld_of_clip
-from app.media.files import is_sequence, noticing, replacing, telling
+from app.media.files import noticing, replacing, telling
 from app.media.formats import picture_format
 from app.media.holding import Losses, Written
 from app.media.maps import map_writer, write_map
+from app.media.numbered import is_sequence
 from app.media.record import Record, digest_of
 from app.model.handles import ARRIVED
 from app.model.picture import Picture

@@ -15,10 +15,11 @@ from app.media.animation import AnimationOptions
 from app.media.clip import USUAL, WHOLE, Clip, FrameRange, rate_of, uncoded
 from app.media.codecs.jpeg import held_dpi
 from app.media.encoders import check_colours, check_colours_of_picture, check_output, is_animation
-from app.media.files import cannot_write, is_sequence, writable
+from app.media.files import cannot_write, writable
 from app.media.formats import picture_format
 from app.media.inputs import MAX_PIXELS
 from app.media.maps import Kind, check_map
+from app.media.numbered import is_sequence
 from app.media.opening import check_picture
 from app.media.pictures import write_picture
 from app.model.picture import Picture

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from app.media.displacement import Displacement, MapError, check_size, cropped, folds, is_beside
-from app.media.files import is_sequence
+from app.media.numbered import is_sequence
 from app.work.export import Target, looked_up, opaque_value, with_alpha
 from app.work.layers import widened
 from solver.gl.device import Device

@@ -12,18 +12,10 @@ from typing import Any, Self, TypeVar
 
 from app.errors import UserError
 from app.media.encoders import ANIMATIONS
-from app.media.files import (
-    check_folder,
-    check_kept,
-    ignores_capitals,
-    is_sequence,
-    make_folder,
-    stands_for_files,
-    takes_place,
-    unnumbered,
-)
+from app.media.files import check_folder, check_kept, ignores_capitals, make_folder, takes_place
 from app.media.formats import FORMATS
 from app.media.inputs import MAX_PIXELS
+from app.media.numbered import is_sequence, stands_for_files, unnumbered
 from app.media.opening import Opened, open_recipe
 from app.media.project import frame_numbers, picture_names
 from app.media.source import CLIP_ENDINGS

@@ -1,4 +1,4 @@
-"""Names of numbered files, and what of them is missing."""
+"""What may be written over what, and how a file takes another's place."""
 
 from __future__ import annotations
 
@@ -13,38 +13,7 @@ from pathlib import Path
 import pytest
 
 from app.errors import UserError
-from app.media.files import (
-    cannot_write,
-    check_kept,
-    check_numbers,
-    is_sequence,
-    listed,
-    name_from,
-    number_in,
-    numbered,
-    numbered_files,
-    replacing,
-    takes_place,
-    unnumbered,
-)
-
-
-@pytest.mark.parametrize(
-    ("pattern", "number", "name", "stem"),
-    [
-        ("plate.%04d.exr", 7, "plate.0007.exr", "plate"),
-        ("plate.%04d.exr", 123456, "plate.123456.exr", "plate"),
-        ("plate_####.exr", 7, "plate_0007.exr", "plate"),
-        ("plate-##.png", 7, "plate-07.png", "plate"),
-        ("%d.png", 7, "7.png", "frames"),
-        ("a%02db.png", 7, "a07b.png", "ab"),
-    ],
-)
-def test_the_file_of_a_number_and_back(pattern: str, number: int, name: str, stem: str) -> None:
-    assert is_sequence(pattern)
-    assert numbered(f"folder/{pattern}", number) == Path("folder", name)
-    assert number_in(pattern, name) == number
-    assert unnumbered(pattern) == stem
+from app.media.files import cannot_write, check_kept, name_from, replacing, takes_place
 
 
 def test_a_picture_is_named_by_the_way_to_it_and_on_another_drive_by_all_of_its_path(
@@ -53,43 +22,6 @@ def test_a_picture_is_named_by_the_way_to_it_and_on_another_drive_by_all_of_its_
     assert name_from(Path("/a/b"), Path("/a/c/d.png")) == "../c/d.png"
     monkeypatch.setattr(os.path, "relpath", ntpath.relpath)  # as it is on Windows
     assert name_from(Path("C:/a"), Path("D:/c/d.png")).endswith("/D:/c/d.png")
-
-
-def test_what_is_no_file_of_a_sequence() -> None:
-    for name in ("a.7.png", "a.00007.png", "a.007.jpg", "b.007.png", "a.-07.png", "a.007.png.part", "a..png"):
-        assert number_in("a.%03d.png", name) is None
-    assert number_in("a.png", "a.png") is None
-    assert [is_sequence(name) for name in ("a#.png", "a.png", "100%.png", "%04d/a.png")] == [False] * 4
-    assert unnumbered("plate.exr") == "plate"
-
-
-def test_files_are_in_the_order_of_their_numbers(tmp_path: Path) -> None:
-    for name in ("a.10.png", "a.9.png", "a.100.png", "a.txt"):
-        (tmp_path / name).touch()
-    assert [*numbered_files(tmp_path / "a.%d.png")] == [9, 10, 100]
-    with pytest.raises(UserError, match="there is no such file"):
-        numbered_files(tmp_path / "b.%d.png")
-    with pytest.raises(UserError, match=r"there is no folder .*gone; check the name"):
-        numbered_files(tmp_path / "gone" / "f.%d.png")
-
-
-@pytest.mark.parametrize(
-    ("there", "wanted", "said"),
-    [
-        ([1, 3], range(1, 4), "of 1-3 it lacks the frame 2;"),
-        ([], range(5, 6), "of 5 it lacks the frame 5;"),
-        ([4], range(1, 8), "of 1-7 it lacks the frames 1-3, 5-7;"),
-        (range(0, 17, 2), range(17), "the frames 1, 3, 5, 7, 9, 11, 13, 15;"),
-        (range(0, 19, 2), range(19), "the frames 1, 3, 5, 7, 9, 11, 13, 15 and others, 9 in all;"),
-        ([1, 10**18], range(1, 10**18 + 1), "it lacks the frames 2-999999999999999999;"),
-    ],
-)
-def test_missing_numbers_are_named_in_runs_eight_at_most(there: list[int], wanted: range, said: str) -> None:
-    with pytest.raises(UserError) as raised:
-        check_numbers("a.%d.png", there, wanted)
-    assert said in str(raised.value)
-    if len(wanted) < 100:
-        check_numbers("a.%d.png", wanted, wanted)
 
 
 @pytest.mark.parametrize(
@@ -215,18 +147,3 @@ def test_on_a_disk_without_modes_a_file_is_replaced_all_the_same(
 )
 def test_why_a_file_cannot_be_written_is_told_with_what_mends_it(tmp_path: Path, number: int, said: str) -> None:
     assert said in str(cannot_write(tmp_path / "gone" / "a.png", OSError(number, "of its own")))
-
-
-@pytest.mark.parametrize(
-    ("names", "line"),
-    [
-        (["b.png", "a.png"], "b.png, a.png"),
-        ([f"plate.{number}.exr" for number in (1001, 1010, 1002, 1003, 1004)], "plate.1001-1004,1010.exr"),
-        (["f.9.png", "f.10.png", "f.11.png", "g.09.png", "1.mp4"], "f.9-11.png, g.09.png, 1.mp4"),
-        (["2024/a.png", "2025/a.png", "b.png"], "2024-2025/a.png, b.png"),
-        ([f"x{number}.png" for number in range(0, 40, 2)], "x0,2,4,6,8,10,12,14.png and 12 more"),
-        ([f"{letter}.png" for letter in "abcdefghij"], ", ".join(f"{c}.png" for c in "abcdefgh") + " and 2 more"),
-    ],
-)
-def test_names_are_listed_in_a_line(names: list[str], line: str):
-    assert listed(names) == (line, not line.endswith(" more"))

@@ -18,7 +18,7 @@ from PIL import Image
 from app.errors import UserError
 from app.media.animation import animation_writer
 from app.media.clip import WHOLE, Clip, FrameRange
-from app.media.files import sequence_of
+from app.media.numbered import sequence_of
 from app.media.pictures import read_picture, write_picture
 from app.media.reel import AHEAD, Reel
 from app.model.picture import Picture

@@ -24,8 +24,9 @@ from app.media import ffmpeg
 from app.media.auxiliary import Pictures
 from app.media.depth import to_bits
 from app.media.displacement import Displacement, cropped, to_st
-from app.media.files import is_sequence, takes_place
+from app.media.files import takes_place
 from app.media.maps import read_map, write_map
+from app.media.numbered import is_sequence
 from app.media.pictures import read_picture, write_picture
 from app.media.source import open_source
 from app.media.video import read_clip
