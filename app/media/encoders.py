@@ -1,4 +1,7 @@
-"""What each kind of animation file is encoded with: its containers and codecs, their quality, and what they hold."""
+"""What each kind of animation file is encoded with: its containers and codecs, their quality, and what they hold.
+
+Long, as every kind has its row in one table, and the checks below read it.
+"""
 
 from __future__ import annotations
 

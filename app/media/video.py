@@ -1,4 +1,7 @@
-"""Reading a clip: what it is, and its frames one after the other."""
+"""Reading a clip: what it is, and its frames one after the other.
+
+Long, as everything known of a clip is picked out of the lines that ffmpeg prints of it, by the functions below.
+"""
 
 from __future__ import annotations
 

@@ -3,8 +3,9 @@
 A force that pushes has `faces`: an acceleration on the MAC faces, lengths / s^2 (an impulse, lengths / s, if it is
 instantaneous). One that makes or takes room has a `divergence`, 1 / s, which the projection leaves in the velocity: an
 incompressible fluid could not swell otherwise. One that is local has a `motion`, lengths / s, which carries the picture
-and not the fluid. All are for a time law of 1; `build` makes them ready for the solver. The kinds stand
-together, as they share the shapes below them.
+and not the fluid. All are for a time law of 1; `build` makes them ready for the solver.
+
+Long, as all kinds stand together: they share the shapes below them.
 """
 
 from __future__ import annotations

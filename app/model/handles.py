@@ -1,4 +1,7 @@
-"""The handles and pins of a recipe: points and lines of the picture that are led somewhere, or stay where they are."""
+"""The handles and pins of a recipe: points and lines of the picture that are led somewhere, or stay where they are.
+
+Long, as what cannot be met is found by comparing all of them, in their own coordinates.
+"""
 
 from __future__ import annotations
 
@@ -318,25 +321,25 @@ def objections(
     handles: Sequence[RecipeHandle], pins: Sequence[RecipePin], extent: tuple[float, float]
 ) -> Iterator[str]:
     """What of them cannot be met, each by number; what can be is done all the same."""
-    led = [_Way(label, one, extent) for label, one in labelled(handles, pins) if not one.muted]
-    for way in led:
-        outside, beyond = (((places < 0) | (places > extent)).any(axis=1) for places in (way.before, way.after))
+    led = [_Move(label, one, extent) for label, one in labelled(handles, pins) if not one.muted]
+    for move in led:
+        outside, beyond = (((places < 0) | (places > extent)).any(axis=1) for places in (move.before, move.after))
         if outside.all():
-            yield f"{way.label} takes hold of nothing: {_shown(way.led.corners[0])} is outside the picture"
+            yield f"{move.label} takes hold of nothing: {_shown(move.led.corners[0])} is outside the picture"
             continue
         if outside.any():
-            yield f"{way.label} reaches out of the picture: what is outside is not moved"
-        if not (ends := way.after[beyond & ~outside]).size and (short := way.short_of_edges(extent)) > ARRIVED:
+            yield f"{move.label} reaches out of the picture: what is outside is not moved"
+        if not (ends := move.after[beyond & ~outside]).size and (short := move.short_of_edges(extent)) > ARRIVED:
             more = "what is at the picture's edge stays there"
-            yield f"{way.label} stays {100 * short:.3g}% of the longer side short: {more}"
+            yield f"{move.label} stays {100 * short:.3g}% of the longer side short: {more}"
         if ends.size:
-            yield f"{way.label} goes only to the picture's edge: {_shown(ends[0] / extent)} is outside the picture"
-        elif way.far > LARGEST_LEAD:
+            yield f"{move.label} goes only to the picture's edge: {_shown(ends[0] / extent)} is outside the picture"
+        elif move.far > LARGEST_LEAD:
             more = f"and it goes {LARGEST_LEAD:g} times at most; give it a larger reach (radius)"
-            yield f"{way.label} has its goal {way.far:.3g} times as far away as it reaches, {more}"
-        if way.led.closed and _area(way.before) * _area(way.after) < 0:
-            yield f"{way.label} is turned inside out by its goals"
-    for one, other in combinations([way for way in led if way.led.takes_hold], 2):
+            yield f"{move.label} has its goal {move.far:.3g} times as far away as it reaches, {more}"
+        if move.led.closed and _area(move.before) * _area(move.after) < 0:
+            yield f"{move.label} is turned inside out by its goals"
+    for one, other in combinations([move for move in led if move.led.takes_hold], 2):
         if max(one.led.start, other.led.start) < min(one.until, other.until):
             near = min(one.reach, other.reach)
             before, after = (
@@ -358,15 +361,15 @@ def objections(
 
 def leads_too_far(led: RecipeHandle | RecipePin, extent: Point) -> bool:
     """True if its goal is farther than it goes."""
-    return _Way("", led, extent).far > LARGEST_LEAD
+    return _Move("", led, extent).far > LARGEST_LEAD
 
 
 def reach_of(led: RecipeHandle | RecipePin, extent: Point) -> float:
     """How far it reaches as a whole, in longer sides: its radius, or what its line needs."""
-    return _Way("", led, extent).reach
+    return _Move("", led, extent).reach
 
 
-class _Way:
+class _Move:
     """Where a handle or a pin leads its corners: before and after, (n, 2) in longer sides."""
 
     def __init__(self, label: str, led: RecipeHandle | RecipePin, extent: Point) -> None:

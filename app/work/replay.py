@@ -349,7 +349,7 @@ class Replay:
         """
         begun = None
         if (acts or leads) and self._has_windows:
-            led, begun = self._ways() if leads else ([], None)
+            led, begun = self._moves() if leads else ([], None)
             window = FlowWindow.of(acts, self.window, self.grid, led)
             if window != self.window:
                 assert isinstance(self.fluid, Fluid)
@@ -364,13 +364,13 @@ class Replay:
                     flow.release()
         return begun
 
-    def _ways(self) -> tuple[list[Led], Begun | None]:
+    def _moves(self) -> tuple[list[Led], Begun | None]:
         """The handles and pins that are in force in this tick, and what `Handles.lead` need not look for again."""
         if not all(led.detail for _, led in self.led if led.is_in_force(self.tick, self.recipe.fluid.dt)):
             return [WHOLE], None
         dt, found = self.recipe.fluid.dt, list[Led]()
-        ways, begun = self.handles.ways(self.tick * dt, dt)
-        for number, here, then, is_moving, begins, is_late in ways:
+        moves, begun = self.handles.moves(self.tick * dt, dt)
+        for number, here, then, is_moving, begins, is_late in moves:
             (_, led), handle = self.led[number], self.handles.handles[number]
             found.append(Led(led.detail, handle.reach, handle.push_radius, here, then, is_moving, begins, is_late))
         return found, begun

@@ -47,7 +47,7 @@ SLOWING, STOPPED = 0.92, 0.8
 SLOWING_LOCAL, STOPPED_LOCAL = 0.4, 0.22
 STRETCHING, TORN = 8.0, 12.0
 # Seconds in which a handle halves the way it has left, or it lets go: with nothing in its way a fiftieth is left then.
-PATIENCE = 4 / RATE
+HALVED_IN = 4 / RATE
 CORE = 0.5  # of the radius of what turns or swells, where it does so evenly
 NO_TIME = 1e-38  # seconds: less is none in 32 bits
 FOUND = 1e-7  # longer sides, as places are rounded
@@ -75,7 +75,7 @@ class Ring(NamedTuple):
         return float(np.hypot(*self.arms.T).mean())
 
 
-class Way(NamedTuple):
+class Move(NamedTuple):
     """Where the points of a handle in force are led in a step.
 
     Attributes:
@@ -229,7 +229,7 @@ class Handles:
     def lead(self, dt: float, time: float, known: Begun | None = None) -> None:
         """Before a step at a time: find where the handles are and shall go, and add what the fluid lacks of that.
 
-        `known`: what `ways` of the same step found.
+        `known`: what `moves` of the same step found.
         """
         if (dt := check_step(dt)) < NO_TIME:
             raise ValueError("to lead a handle takes some time")
@@ -306,7 +306,7 @@ class Handles:
         )
         self._fluid.impulse.add(lambda faces: self._push(lead, faces, lead.wanted))
 
-    def ways(self, time: float, dt: float) -> tuple[list[Way], Begun | None]:
+    def moves(self, time: float, dt: float) -> tuple[list[Move], Begun | None]:
         """Before a step at a time, of all that are in force in it; and for `lead` what begins, if something does.
 
         That holds for the map as it leads, also on another window: it would have to be drawn and inverted again there.
@@ -319,16 +319,16 @@ class Handles:
             known = self._begun(new)
             starts[new] = places[new] = known.places
         has_ended = any(abs(handle.last - time) <= dt / 2 for handle in self.handles)
-        found = list[Way]()
+        found = list[Move]()
         for number in np.flatnonzero(in_force).tolist():
             shape, rows = self._shapes[number], self._rows[number]
             here, start = places[rows], starts[rows]
             before, now, then = (shape.wanted(start, at, dt) for at in (time - dt, time, time + dt))
             is_led, was_led = (np.abs(one - other).max() > FOUND * dt for one, other in ((then, now), (now, before)))
-            waits = self._progress[number, 1] <= PATIENCE or has_ended
+            waits = self._progress[number, 1] <= HALVED_IN or has_ended
             is_away = waits and float(np.hypot(*(then - here).T).max()) > near
             is_begun = not (was_led and np.isfinite(self._starts[rows]).all())
-            found.append(Way(number, here, then, bool(is_led or is_away), bool(is_led and is_begun), not is_led))
+            found.append(Move(number, here, then, bool(is_led or is_away), bool(is_led and is_begun), not is_led))
         return found, known
 
     def make_up(self, velocity: Field) -> None:
@@ -428,11 +428,11 @@ class Handles:
             elif shape.short_of_edges(starts) > FOUND:
                 found.append("edge")
             else:
-                pace, least = float(slower[rows].min()), math.log(2) / RATE / PATIENCE  # (H1): half in that time
+                pace, least = float(slower[rows].min()), math.log(2) / RATE / HALVED_IN  # (H1): half in that time
                 firm = pace if np.abs(due - starts).max() > FOUND else 1.0  # what is led lets go as it goes slower
                 if pace < least:
                     found.append("strain")
-                elif waited <= PATIENCE:
+                elif waited <= HALVED_IN:
                     found.append("under way" if time < shape.handle.last else "late" if left > near else None)
                 elif pace * (1 - (1 - firm) ** 2) < least:  # it has its push before the step and once more after it
                     found.append("strain")
@@ -616,7 +616,7 @@ class Handles:
         nearer = targets.remaining < least / 2
         least, waited = np.where(nearer, targets.remaining, least), np.where(nearer, 0.0, waited + dt)
         self._progress[active] = np.stack([least, waited], axis=-1)
-        return np.where((waited > PATIENCE) & self._are_away(targets), 0.0, 1.0)
+        return np.where((waited > HALVED_IN) & self._are_away(targets), 0.0, 1.0)
 
     def _are_away(self, targets: Targets) -> np.ndarray:
         """True for handles of which the farthest point has more than a texel to go."""
