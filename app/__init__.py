@@ -1,3 +1,5 @@
+"""The program: the command line, the window, and all that is not physics."""
+
 import os
 
 # The threads of linear algebra, which here is of a few hundred numbers, wait for one another at full speed wherever the

@@ -227,7 +227,7 @@ def test_a_file_whose_name_has_a_number_s_place_is_that_file(folder: Path, fluid
         before = here(folder)
         for output in ("{name}-w.png", "new"):
             ran = fluidwarp(folder, *words, "cat.png", "50%d.png", "-o", output)
-            line = "50%d.png would number the files of a sequence as the name of a result; rename it"
+            line = "a result named after 50%d.png would be a sequence of numbered files; rename 50%d.png"
             assert (ran.returncode, ran.stderr) == (1, f"fluidwarp: {line}\n")
         ran = fluidwarp(folder, *words, "50%d.png", "-o", "50%d.png")
         assert (ran.returncode, ran.stderr) == (

@@ -79,7 +79,8 @@ def read_pairs(paths: Sequence[Path], size: Size) -> Pairs:
         said = f"{files} {has} {found}; pairs need two, where the points are and where they should be"
         raise UserError(said, in_window=f"{said}: drop two files at once")
     if len(sets[0]) != len(sets[1]):
-        raise UserError(f"{files}: {len(sets[0])} landmarks cannot be paired with {len(sets[1])}")
+        said = f"{files}: {len(sets[0])} landmarks cannot be paired with {len(sets[1])}"
+        raise UserError(f"{said}; give two sets of as many points")
     if not len(sets[0]):
         raise UserError(f"{files} {has} no pairs")
     _check_spread(files, counted, size)
@@ -235,7 +236,7 @@ def _read_pts(path: Path, lines: Lines) -> np.ndarray:
         elif key != "version":
             raise _bad(path, number, f"expected version, n_points or {{, and not {line[:40]!r}")
     else:
-        raise UserError(f"{path} is not a .pts file: it has no {{ before its points")
+        raise UserError(f"{path} is not a .pts file: it has no {{ before its points; save it as one")
     rows = []
     for number, line in lines:
         if line == "}":
@@ -245,7 +246,7 @@ def _read_pts(path: Path, lines: Lines) -> np.ndarray:
                 raise _bad(path, more, f"one set of landmarks ends with }}, and not {line[:40]!r} after it")
             return np.reshape(rows, (-1, 2))
         rows.append(_numbers(path, number, line, line.split(), 2, "x y"))
-    raise UserError(f"{path} ends in the middle of its points: it has no }}")
+    raise UserError(f"{path} ends in the middle of its points: it has no }}; get it again")
 
 
 def _read_tps(path: Path, lines: Lines) -> list[np.ndarray]:

@@ -1,4 +1,4 @@
-"""What of a file is lost, in words."""
+"""Words for what of a file is lost; what a result cannot hold is told in `app/media/holding.py`."""
 
 from __future__ import annotations
 

@@ -264,7 +264,7 @@ def _read_flo(file: Path, max_pixels: int, check: Check) -> tuple[np.ndarray, di
         stream.seek(len(head))
         width, height = (int(side) for side in np.frombuffer(head[4:12].ljust(8, b"\0"), "<i4"))
         if len(head) < 12 or np.frombuffer(head[:4], "<f4")[0] != FLO_MAGIC or min(width, height) < 1:
-            raise UserError(f"Cannot read {file}: it is not a Middlebury .flo file.")
+            raise UserError(f"Cannot read {file}: it is not a Middlebury .flo file; get it again.")
         check_size(file, width, height, max_pixels)
         if os.fstat(stream.fileno()).st_size != 12 + width * height * 8:
             raise UserError(
@@ -290,7 +290,7 @@ def _read_npy(file: Path, max_pixels: int, check: Check) -> tuple[np.ndarray, di
                 f"Cannot read {file}: a map is a float array (height, width, 2), this one is {kind} {shape}."
             )
         if min(shape) < 1:
-            raise UserError(f"Cannot read {file}: the array {shape} is empty.")
+            raise UserError(f"Cannot read {file}: the array {shape} is empty; make it again.")
         check_size(file, shape[1], shape[0], max_pixels)
         if os.fstat(stream.fileno()).st_size < stream.tell() + math.prod(shape) * kind.itemsize:
             raise UserError(f"Cannot read {file}: it is truncated; get it again.")

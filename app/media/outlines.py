@@ -82,7 +82,8 @@ def outline(path: Path, size: Size, notices: list[str]) -> np.ndarray:
 
     inside = intensity(read_picture(path)) > 0.5
     if inside.all() or not inside.any():
-        raise UserError(f"{path} has no outline: {'all' if inside.any() else 'nothing'} of it is brighter than grey")
+        found = f"{path} has no outline: {'all' if inside.any() else 'nothing'} of it is brighter than grey"
+        raise UserError(f"{found}; paint the area white and the rest black")
     parts = np.zeros(inside.shape, np.int32)
     ndimage.label(inside, output=parts)
     areas = np.bincount(parts.ravel())[1:]
@@ -90,7 +91,7 @@ def outline(path: Path, size: Size, notices: list[str]) -> np.ndarray:
         notices.append(f"{path} has {large} parts; the largest is fitted")
     filled = np.asarray(ndimage.binary_fill_holes(parts == areas.argmax() + 1), np.float64)
     if (soft := ndimage.gaussian_filter(np.pad(filled, AROUND), SOFT)).max() <= 0.5:
-        raise UserError(f"{path} has no outline: what is brighter than grey is only specks")
+        raise UserError(f"{path} has no outline: what is brighter than grey is only specks; paint a larger area white")
     line = _traced(soft) - AROUND
     return np.clip(line * np.divide(size, inside.shape[::-1]), 0, size)
 

@@ -176,4 +176,4 @@ def with_changed(recipe: Recipe, which: Collection[Which], changed: Changed) -> 
 def check_length(ticks: int) -> None:
     """Raise `UserError` if a recording of so many ticks would be longer than a recipe may be."""
     if ticks > MOST_TICKS:
-        raise UserError(f"a recording has at most {MOST_TICKS} ticks, and this would be of {ticks}")
+        raise UserError(f"a recording has at most {MOST_TICKS} ticks, and this would have {ticks}; make it end earlier")

@@ -171,7 +171,7 @@ def connected(chosen: np.ndarray, place: tuple[int, int]) -> np.ndarray:
         ValueError: if that is not chosen.
     """
     if not chosen[place]:
-        raise ValueError("what lies 'at' the place is not chosen itself")
+        raise ValueError("'at' names a place that is not chosen; name one that is")
     # The runs of each row are vertices, and those that touch in two rows are connected.
     run = np.cumsum(chosen & ~np.pad(chosen, ((0, 0), (1, 0)))[:, :-1]).reshape(chosen.shape)
     both = chosen[:-1] & chosen[1:]

@@ -1,4 +1,4 @@
-"""What of the handles cannot be met, and that the warp folds, told as soon as it comes up, as by the command line."""
+"""Cautions: handles that miss their goals, and folds, told as soon as they come up, as on the command line."""
 
 from __future__ import annotations
 

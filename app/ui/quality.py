@@ -219,7 +219,7 @@ class Quality:
                 if self.grid < before:
                     self.messages.say(
                         f"Painting fell below {LEAST:.0f} frames a second, so the grid is now {self.grid} cells "
-                        f"instead of {before}. Quality in the inspector changes it."
+                        f"instead of {before}. Detail in the inspector, under Picture and quality, changes it."
                     )
 
     @property

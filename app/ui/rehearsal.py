@@ -1,4 +1,4 @@
-"""What the hand does for the first time is done before, where nobody sees it: that is when drivers compile."""
+"""Rehearsal: what a hand may do first is done ahead, unseen, since drivers compile shaders at their first use."""
 
 from __future__ import annotations
 

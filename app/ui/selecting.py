@@ -250,7 +250,8 @@ class _Search:
 
     def __init__(self, colours: np.ndarray, box: tuple[float, float, float, float]) -> None:
         self._colours, self._box = colours, box
-        self._found: tuple[Point, ...] | UserError = UserError("No subject is found: the search has failed.")
+        failed = "No subject is found: the search has failed. Draw the box again."
+        self._found: tuple[Point, ...] | UserError = UserError(failed)
         self.thread = threading.Thread(target=self._work, name="looking for a subject", daemon=True)
         self.thread.start()
 

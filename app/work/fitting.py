@@ -714,7 +714,7 @@ class _Search:
         numbers, taken = np.flatnonzero(inside[:, 0]), len(base.handle) + len(base.pin) - len(self.aim.own)
         if not len(numbers):
             if self.aim.own:
-                raise UserError("all handles with a goal lie outside the picture")
+                raise UserError("all handles with a goal lie outside the picture; set one inside it")
             raise UserError("all pairs lie outside the picture; they are in pixels from its top-left corner")
         if len(numbers) + taken > MOST_HANDLES:
             others = f" beside the recipe's {taken} handles and pins" if taken else ""

@@ -1,4 +1,4 @@
-"""What is made of what: the picture, the recipe, and all that is written."""
+"""Jobs: a picture, a recipe, and all that is written of them; checked before the work begins."""
 
 from __future__ import annotations
 
@@ -250,7 +250,9 @@ class Job:
         if outputs.file is not None:
             check_result(result_size(self.recipe, self.picture), self.picture, "--size, or 'output.size',")
         if self.clip is not None and self.recipe.mode == "density":
-            raise UserError(f'mode "density" moves the values of one picture; {self.clip.path} is a clip')
+            raise UserError(
+                f'mode "density" moves the values of one picture, and {self.clip.path} is a clip; give a picture'
+            )
         for path in outputs.files:
             writable(path)
         if outputs.states is not None and os.path.exists(outputs.states) and not os.path.isdir(outputs.states):

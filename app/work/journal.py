@@ -3,6 +3,7 @@
 The first line names the format. Every other one is a checksum (CRC 32, in eight hexadecimal digits) and a JSON object:
 what has changed since the record before. A recipe is told by how it differs from the one before it in the history, so
 that a stroke is written once, in however many states of the history it is.
+`recovery.py` writes and finds journals.
 """
 
 from __future__ import annotations

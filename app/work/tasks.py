@@ -253,5 +253,6 @@ def named(path: Path, picture: Path) -> Path:
     whole = not numbers or Path(path).suffix.lower() in FORMATS
     found = Path(str(path).replace(NAME, picture.stem if whole else unnumbered(picture)))
     if found != path and is_sequence(found) and not (numbers or is_sequence(path)):
-        raise UserError(f"{picture.name} would number the files of a sequence as the name of a result; rename it")
+        name = picture.name
+        raise UserError(f"a result named after {name} would be a sequence of numbered files; rename {name}")
     return found

@@ -1,4 +1,4 @@
-"""How strong pushes are that together do what is wanted of them, none stronger than a step bears: (H3)."""
+"""The balance of pushes (H3): strengths that together do what is wanted, none more than a step bears."""
 
 from __future__ import annotations
 

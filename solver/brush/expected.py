@@ -1,4 +1,4 @@
-"""What det J of a map would be if it lost nothing: sources and what is local change areas."""
+"""The expected det J of a map, if it lost nothing: only sources and local motion change areas."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A map that was closed, or what is undone of those before it."""
+"""A closed map: an accumulated map kept as it was while a new one goes on over it, or what is undone of such."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How far the cubic of a map agrees with itself."""
+"""Evenness of a map: how well the cubics of neighbouring cells agree on det J."""
 
 from __future__ import annotations
 

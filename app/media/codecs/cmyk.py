@@ -1,4 +1,4 @@
-"""Inks as colours."""
+"""CMYK: inks made into RGB."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""OpenEXR."""
+"""OpenEXR: colours, further channels and parts, windows and attributes."""
 
 from __future__ import annotations
 
