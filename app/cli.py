@@ -200,7 +200,7 @@ def edit(
 
 # Inputs are `readable=False`: files are looked at where they are opened, so that one of many does not stop the others.
 
-MaxPixels = Annotated[int, typer.Option(min=1, help="Refuse pictures, clips and maps of more pixels.")]
+MaxPixels = Annotated[int, typer.Option(min=1, help="Refuse pictures, clips and maps with more pixels than this.")]
 Bits = Annotated[int | None, typer.Option(help="Bits per channel: 8, 16 (half in EXR) or 32. Default: the picture's.")]
 Size = Annotated[int | None, typer.Option(help="Longer side of the result, in pixels.")]
 Quality = Annotated[int | None, typer.Option(help="Quality of JPEG, WebP, AVIF and video, 1 to 100.")]
@@ -221,7 +221,7 @@ Cluster = Annotated[
     typer.Option(metavar="ADDRESS", help="Dask scheduler to hand several pictures to, such as tcp://host:8786."),
 ]
 Verbose = Annotated[
-    bool, typer.Option("--verbose", help="Of several pictures, say of each what there is to say, as it is done.")
+    bool, typer.Option("--verbose", help="With several pictures, print the messages of each when it is done.")
 ]
 Dpi = Annotated[
     float | None,
@@ -295,8 +295,8 @@ def render(
         float | None, typer.Option(help="Frames per second of a picture's animation; a clip keeps its own.")
     ] = None,
     quality: Quality = None,
-    start: Annotated[float | None, typer.Option("--from", help="First second of an animation.")] = None,
-    end: Annotated[float | None, typer.Option("--to", help="Last second of an animation.")] = None,
+    start: Annotated[float | None, typer.Option("--from", help="Second at which the animation begins.")] = None,
+    end: Annotated[float | None, typer.Option("--to", help="Second at which the animation ends.")] = None,
     frames: Frames = None,
     resume: Resume = False,
     states: Annotated[
@@ -319,8 +319,8 @@ def render(
     OUT.png is the picture at the end, OUT.mp4 or OUT.gif the animation, OUT.%04d.png its frames.
     A clip is warped frame by frame, and keeps its sound.
 
-    Pictures are written to the folder OUT under their own names, if it has no ending or there are several, or to a name
-    such as OUT/{name}-w.png.
+    If OUT has no ending, or there are several pictures, OUT is a folder for them, and each keeps its name.
+    Or give a name for each, such as OUT/{name}-w.png.
     """
     from app.work.jobs import MapOutput, Outputs
     from app.work.tasks import Edits, Task, opened
@@ -519,7 +519,7 @@ def fit(
     """Find handles that bring points to given places, with the least work and without a fold.
 
     Ctrl+C stops and writes the best result so far. FITTED.toml is a recipe: `fluidwarp render FITTED.toml` plays it.
-    Pairs that miss their places are named, with the distance left; the exit status is 0 all the same.
+    Pairs that miss their places are named, with the distance left; the exit status is still 0.
     """
     from time import monotonic
 
@@ -592,8 +592,8 @@ def apply(
 ) -> None:
     """Warp pictures, clips or numbered files by a warp map, made by fluidwarp or another program.
 
-    Pictures are written to the folder OUT under their own names, if it has no ending or there are several, or to a name
-    such as OUT/{name}-w.png.
+    If OUT has no ending, or there are several pictures, OUT is a folder for them, and each keeps its name.
+    Or give a name for each, such as OUT/{name}-w.png.
     """
     from app.model.recipe import Recipe
     from app.work.apply_job import Application
