@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from app.model.recipe import Recipe
-from app.model.strokes import Stroke
 from app.model.undo import History
-from app.model.windows import on_grid
+from app.model.windows import Made, on_grid
 
 
 class Document:
@@ -32,9 +31,9 @@ class Document:
 
     def simulate_on(self, cells: int) -> None:
         """Let all states of the work be simulated on another grid: no edit, nothing to undo and nothing to save."""
-        made = dict[tuple[int, int], Stroke]()
+        made: Made = {}
         self.history.replace_all(lambda recipe: on_grid(recipe, cells, made))
-        self._saved = on_grid(self._saved, cells)
+        self._saved = on_grid(self._saved, cells, made)
 
     @property
     def saved_recipe(self) -> Recipe:

@@ -79,13 +79,17 @@ def with_detail(led: SomeLed, recipe: Recipe, extent: Point) -> SomeLed:
     return led.model_copy(update={"detail": detail_for_led(reach_of(led, extent), recipe, settings)})
 
 
-def on_grid(recipe: Recipe, cells: int, made: dict[tuple[int, int], Stroke] | None = None) -> Recipe:
+# Strokes before and after, by the identity of the first, which is kept so that no other one gets it, and by the detail.
+Made = dict[tuple[int, int], tuple[Stroke, Stroke]]
+
+
+def on_grid(recipe: Recipe, cells: int, made: Made | None = None) -> Recipe:
     """The recipe on a grid that nobody has chosen: on coarser cells more brushes are small, and get windows.
 
     Args:
         recipe: whose strokes were made on its own grid.
         cells: along the longer side, from now on.
-        made: the strokes that have changed, by what they were; of several recipes, they go on sharing them.
+        made: the strokes that have changed, as they were and are; several recipes go on sharing them so.
     """
     moved, made = recipe.on_grid(cells), {} if made is None else made
     if cells >= recipe.fluid.grid:
@@ -95,7 +99,10 @@ def on_grid(recipe: Recipe, cells: int, made: dict[tuple[int, int], Stroke] | No
         if stroke.detail or stroke.tool not in FLOWING or stroke.symmetry != "none":
             return stroke
         detail = detail_for(stroke.radius, moved, moved.fluid_at(stroke.first_tick))
-        return made.setdefault((id(stroke), detail), stroke.model_copy(update={"detail": detail})) if detail else stroke
+        if not detail:
+            return stroke
+        changed = stroke, stroke.model_copy(update={"detail": detail})
+        return made.setdefault((id(stroke), detail), changed)[1]
 
     return moved.edited(stroke=tuple(map(finer, recipe.stroke)))
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from app.model.handles import RecipeHandle, RecipePin, heading
@@ -53,9 +55,7 @@ class Cautions:
             words = [f"{heading(sentence)}." for sentence in [*new.values()][:TOLD]]
             rest = [f"{len(new) - TOLD} more like these: see the inspector."] * (len(new) > TOLD)
             rest += [f"{heading(ANEW)}."] * any(unmet[key].helped for key in new if key in unmet)
-            self._messages.caution(
-                " ".join([*words, *rest]), lambda: session is self._workspace.session and _led(session) == led
-            )
+            self._messages.caution(" ".join([*words, *rest]), self._as_long_as_leads(session, led))
 
     def _look_at_folds(self, session: Session) -> None:
         # A frame that draws the picture at rest has enough to do.
@@ -87,12 +87,15 @@ class Cautions:
         new = [held for held in session.held if held.label not in self._held_back and _is_over(session, held)]
         if new:
             self._held_back |= {held.label for held in new}
-            led = _led(session)
             self._messages.caution(
                 f"{heading(new[0].label)} holds its place, so that the stroke moves less there. "
                 "To push it freely, mute or remove it first.",
-                lambda: session is self._workspace.session and _led(session) == led,
+                self._as_long_as_leads(session, _led(session)),
             )
+
+    def _as_long_as_leads(self, session: Session, led: Led) -> Callable[[], bool]:
+        """Whether a work is still open, and leads the same."""
+        return lambda: session is self._workspace.session and _led(session) == led
 
 
 def _moves(tool: str) -> bool:
