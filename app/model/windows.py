@@ -84,7 +84,7 @@ Made = dict[tuple[int, int], tuple[Stroke, Stroke]]
 
 
 def on_grid(recipe: Recipe, cells: int, made: Made | None = None) -> Recipe:
-    """The recipe on a grid that nobody has chosen: on coarser cells more brushes are small, and get windows.
+    """The recipe on another grid: on coarser cells more brushes are small, and get windows.
 
     Args:
         recipe: whose strokes were made on its own grid.

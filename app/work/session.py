@@ -122,7 +122,8 @@ class Session(Playing):
         self.is_grid_automatic = False
         self.forget_grid()
         if cells != self._live.fluid.grid:
-            self.edit(name, fluid=self._live.fluid.model_copy(update={"grid": cells}))
+            moved = on_grid(self._live, cells)
+            self.edit(name, fluid=moved.fluid, stroke=moved.stroke)
 
     def prepare_grid(self, cells: int, seconds: float) -> bool:
         """Simulate on another grid too, for about `seconds`; True once it has come as far and taken this one's place.

@@ -720,7 +720,7 @@ def test_whatever_is_done_while_strokes_wait_the_recipe_is_what_is_seen(
 
 
 def test_a_coarser_grid_makes_no_stroke_coarser(session: Session) -> None:
-    """Nobody has chosen it: of 20 cells a brush's radius 7 were left, and a lip that went 97 pixels went 90."""
+    """Of 20 cells a brush's radius 7 were left, and a lip that went 97 pixels went 90."""
     session.begin_with(grid=80, viscosity=PUTTY.viscosity, drag=PUTTY.drag)
     for y in (0.4, 0.6):
         paint(session, "push", (0.4, y), (0.6, y))
@@ -741,6 +741,20 @@ def test_a_coarser_grid_makes_no_stroke_coarser(session: Session) -> None:
     session.settle()
     assert np.array_equal(session.replay.warp.read(), after)
     assert session.recipe == session.document.recipe
+
+
+def test_nor_does_one_that_the_person_chooses(session: Session) -> None:
+    """And it is one edit: undone, the strokes are as they were made."""
+    session.begin_with(grid=80, viscosity=PUTTY.viscosity, drag=PUTTY.drag)
+    paint(session, "push", (0.4, 0.5), (0.6, 0.5))
+    session.settle()
+    made, before = session.recipe, session.replay.warp.read((120, 90))
+    session.set_grid(24)
+    session.settle()
+    assert (session.recipe.fluid.grid, session.recipe.stroke[0].detail > 80) == (24, True)
+    assert np.abs(session.replay.warp.read((120, 90)) - before).max() < 0.02 * np.abs(before).max()
+    session.undo()
+    assert session.recipe == made
 
 
 def test_a_grid_that_is_not_wanted_any_more_has_nothing_on_the_gpu(
