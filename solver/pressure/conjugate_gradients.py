@@ -28,6 +28,9 @@ class ConjugateGradients:
     Args:
         device: the device.
         blocks: size of the finest level, in blocks.
+
+    Attributes:
+        add_up: sums of the four components of a field at blocks.
     """
 
     def __init__(self, device: Device, blocks: tuple[int, int]) -> None:
@@ -37,7 +40,7 @@ class ConjugateGradients:
         )
         self._applied = device.field(blocks, 4, "pressure applied")
         # Terms of the dot products, summed over the grid and read back together.
-        self.products = device.field(blocks, 4, "pressure products")
+        self._products = device.field(blocks, 4, "pressure products")
         self.add_up = Reduction(device, blocks, 4, "sum")
 
     @property
@@ -71,14 +74,14 @@ class ConjugateGradients:
         count, rz, smallest = 0, 0.0, squares
         while count < most and squares > wanted:
             z = direction = cycle.solve(residual.read, sweeps)
-            targets = self.products, self._applied
+            targets = self._products, self._applied
             first: dict[str, Any] = {"FIRST": 1} if count == 0 else {}
             before: dict[str, Any] = {}
             so_far: dict[str, Any] = {}
             if count > 0:
-                self.device.pass_("pressure/dot.frag")(self.products, residual=residual.read, z=z)
+                self.device.pass_("pressure/dot.frag")(self._products, residual=residual.read, z=z)
                 rz_before = rz
-                rz, squares, *_ = self.add_up(self.products).tolist()
+                rz, squares, *_ = self.add_up(self._products).tolist()
                 if squares <= wanted:
                     break
                 before = {"before": self._direction.read, "beta": rz / rz_before}
@@ -86,7 +89,7 @@ class ConjugateGradients:
                 direction = self._direction.write
                 targets = *targets, direction
             cycle.finest.draw("apply_operator", targets, first, z=z, residual=residual.read, **before)
-            rz, curvature, rq, qq = self.add_up(self.products).tolist()
+            rz, curvature, rq, qq = self.add_up(self._products).tolist()
             if not (rz and curvature):  # too small for float32
                 break
             alpha = rz / curvature
@@ -114,5 +117,5 @@ class ConjugateGradients:
 
     def release(self) -> None:
         """Free the textures."""
-        for item in (self._pressure, self._direction, self._applied, self.products, self.add_up):
+        for item in (self._pressure, self._direction, self._applied, self._products, self.add_up):
             item.release()

@@ -52,6 +52,7 @@ class Projection:
             device.double_field(blocks, 4, f"pressure {name}") for name in ("residual", "expected", "last")
         )
         self._across, self._down = (device.field(blocks, 4, f"pressure {name}") for name in ("across", "down"))
+        self._squares = device.field(blocks, 4, "squares of the divergence")
         self._source = device.field(size, 1, "balanced source")
         self._solid: np.ndarray | None = None
         self._regions: np.ndarray | None = None
@@ -62,7 +63,7 @@ class Projection:
         """Free the textures."""
         for item in (self._solver, self._cycle, self._residual, self._expected, self._last):
             item.release()
-        for item in (self._across, self._down, self._source):
+        for item in (self._across, self._down, self._squares, self._source):
             item.release()
 
     # -- what goes in and comes out ---------------------------------------------------------------------------------
@@ -176,9 +177,8 @@ class Projection:
         Returns the sums of squares: of the residual without `expected`, with it, and of all terms it is made of.
         """
         defines = {name.upper(): 1 for name in less} | _packing(given)
-        targets = self._residual.read, self._solver.products
-        self._cycle.finest.draw("divergence", targets, defines, **given, **less)
-        squares, left, terms, _ = self._solver.add_up(self._solver.products).tolist()
+        self._cycle.finest.draw("divergence", (self._residual.read, self._squares), defines, **given, **less)
+        squares, left, terms, _ = self._solver.add_up(self._squares).tolist()
         return squares, left, terms
 
     def _subtract_gradient(

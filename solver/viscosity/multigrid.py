@@ -214,23 +214,22 @@ class Multigrid:
 
     def _coarse_correction(self, level: Level, rhs: PackedFaces, rigid: Deflation | None) -> None:
         """f += P A_coarse^-1 P' (rhs - A f); with `rigid` parts M P in place of P, between two corrections of these."""
-        # The write side is free until the correction is added.
-        faces, free = level.faces.read, level.faces.write
-        self.residual(level, faces, rhs, free)
+        faces, residual = level.faces.read, level.residual
+        self.residual(level, faces, rhs, residual)
         coarser = self.levels[level.depth + 1]
-        averaged = free
+        averaged = residual
         if rigid:
-            moved = rigid.correct(free, faces, add=True)
-            self.residual(level, faces, rhs, free)
-            averaged = rigid.average(free, moved)
+            moved = rigid.correct(residual, faces, add=True)
+            self.residual(level, faces, rhs, residual)
+            averaged = rigid.average(residual, moved)
         self.cycle(coarser, coarser.rhs, self._restrict(averaged, coarser, start=True))
         prolong = self.device.pass_("viscosity/prolong.frag", **level.defines, **({"CORRECTION": 1} if rigid else {}))
-        prolong(free.fields, region=level.region, **coarser.faces.read.inputs("coarse_"), **faces.inputs(),
-                alone=coarser.alone, **level.bounds)  # fmt: skip
+        prolong(level.faces.write.fields, region=level.region, **coarser.faces.read.inputs("coarse_"),
+                **faces.inputs(), alone=coarser.alone, **level.bounds)  # fmt: skip
         if rigid:
-            means = rigid.add_others(free, faces)
-            self.residual(level, faces, rhs, free)
-            rigid.correct(free, faces, add=True, means=means)
+            means = rigid.add_others(level.faces.write, faces)
+            self.residual(level, faces, rhs, residual)
+            rigid.correct(residual, faces, add=True, means=means)
         else:
             level.faces.swap()
 

@@ -109,7 +109,7 @@ class Coefficients:
 
 
 class Level:
-    """One level: its operator, its right-hand side and its iterate, as packed faces.
+    """One level: its operator, its right-hand side, its iterate and the residual of that, as packed faces.
 
     Args:
         device: where it lives.
@@ -136,6 +136,7 @@ class Level:
         self.stress = [device.field(ringed, 4, f"{label} stress {name}") for name in ("xx", "yy", "xy") if depth]
         self.rhs = PackedFaces(device, ringed, f"{label} right-hand side")
         self.faces = DoublePackedFaces(device, ringed, f"{label} faces")
+        self.residual = PackedFaces(device, ringed, f"{label} residual")
         # Without solids, what walls leave of a grid whose last column or row is only half in it, at least a channel.
         self.box = max(finest[0] >> depth, 1), max(finest[1] >> depth, 1)
         # 2 where the finer level is a single column or row, which is coarsened along itself only, else 1.
@@ -252,7 +253,7 @@ class Level:
         return self.texels[0] * self.texels[1] <= COARSEST
 
     def release(self) -> None:
-        for item in (*self.packed.values(), *self.stress, self.rhs, self.faces):
+        for item in (*self.packed.values(), *self.stress, self.rhs, self.faces, self.residual):
             item.release()
 
 

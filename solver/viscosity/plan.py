@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 
 # If the bound of `sweeps_alone` needs no more smoothing sweeps than this, they alone are the viscous step: up to
-# kappa = .4. A solve of one iteration costs as much as ten (512^2, one viscosity; a sweep 1.1 J, the solve 11).
+# kappa = .43. A solve of one iteration costs as much as ten (512^2, one viscosity; a sweep 1.1 J, the solve 11).
 MOST_SWEEPS = 10
 # Cells stiffer than this are deflated: below, multigrid alone takes no more iterations. A node that touches the
 # softest cell is never stiffer than 4 kappa_min, the harmonic mean of four of which three are infinitely stiff.
@@ -102,10 +102,10 @@ def sweeps_alone(kappa: float, leaves: float) -> int:
     return math.ceil(math.acosh(1.0 / leaves) / math.acosh(1.0 + 0.125 / kappa))
 
 
-def plan_for(least: float, largest: float, cells: int, is_one: bool, is_sharp: bool) -> Plan:
-    """The plan for kappa between `least` and `largest` on so many cells; see `is_sharp`.
+def plan_for(least: float, largest: float, cells: int, is_one: bool, has_edges: bool) -> Plan:
+    """The plan for kappa between `least` and `largest` on so many cells.
 
-    `is_one`: there is only one viscosity, and nothing solid.
+    `is_one`: there is only one viscosity, and nothing solid. `has_edges`: of stiff parts, see `is_sharp`.
     """
     share, of_one = (1.0, 1.0) if cells > SMALL else (1.0 / 3.0, 1.0 / 9.0)
     count = sweeps_alone(largest, share * TOLERANCE / (16.0 * max(largest, 1e-30)))
@@ -115,7 +115,7 @@ def plan_for(least: float, largest: float, cells: int, is_one: bool, is_sharp: b
         return Plan("cg", 2, of_one * TOLERANCE, cycle_leaves=UNIFORM_CYCLE_LEAVES)
     varies = largest > MODERATE * least
     # Below `MODERATE` only masks with solids are sharp.
-    rigid = is_sharp and (varies or (least > ONE_SWEEP and largest > RIGID_OF_SOFTEST * least))
+    rigid = has_edges and (varies or (least > ONE_SWEEP and largest > RIGID_OF_SOFTEST * least))
     count = 1 if least <= ONE_SWEEP and varies and not rigid else 2
     stiff = max(STIFF, (RIGID_OF_SOFTEST if rigid else STIFF_OF_SOFTEST) * least)
     tolerance = TOLERANCE_STIFF if varies else share * TOLERANCE_MODERATE

@@ -143,11 +143,10 @@ class Viscosity:
     def residual_norm(self, solution: PackedFaces) -> float:
         """|b - A v| / |b| of what `solve` gave, or of any other packed faces; waits for the GPU."""
         finest, rhs = self.multigrid.finest, self._right_hand_side()
-        left = finest.faces.write
-        self.multigrid.residual(finest, solution, rhs, left)
+        self.multigrid.residual(finest, solution, rhs, finest.residual)
         wanted, found = (
             math.sqrt(sum(float((field.get().astype(np.float64) ** 2).sum()) for field in pair.fields))
-            for pair in (rhs, left)
+            for pair in (rhs, finest.residual)
         )
         return found / wanted if wanted else 0.0
 
