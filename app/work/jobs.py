@@ -104,7 +104,7 @@ class Outputs:
     def check(self) -> None:
         """Raise `UserError` for options that do not go with what is written."""
         if self.resume and not any(map(is_sequence, self.files)):
-            raise UserError(f"--resume keeps the files of a sequence, such as f.%04d.png, and {self.files[0]} is none")
+            raise UserError(f"--resume needs a sequence, such as f.%04d.png, and {self.files[0]} is none; leave it out")
         if self.resume and self.stats is not None:
             raise UserError("--stats needs all frames, and --resume makes only the missing ones; use one of them")
         if self.part != WHOLE and not self.has_frames:

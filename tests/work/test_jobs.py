@@ -58,7 +58,7 @@ def test_what_is_an_animation_and_what_has_frames(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("outputs", "said"),
     [
-        ({"file": "a.mp4", "resume": True}, "--resume keeps the files of a sequence"),
+        ({"file": "a.mp4", "resume": True}, "--resume needs a sequence"),
         ({"file": "a.%d.png", "resume": True, "stats": "s.json"}, "use one of them"),
         ({"file": "a.png", "part": (0, 3)}, "--frames is for an animation"),
         ({"file": "a.png", "maps": "m.%04d.npy"}, "numbers the maps of an animation"),

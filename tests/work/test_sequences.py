@@ -342,7 +342,7 @@ def test_a_killed_task_keeps_its_frames(folder: Path, fluidwarp: Run):
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (["-o", "w.mp4"], "--resume keeps the files of a sequence, such as f.%04d.png, and w.mp4 is none"),
+        (["-o", "w.mp4"], "--resume needs a sequence, such as f.%04d.png, and w.mp4 is none; leave it out"),
         (["-o", "w.%04d.exr", "--stats", "s.json"], "--stats needs all frames"),
     ],
 )

@@ -46,7 +46,7 @@ SETTINGS = (
     Setting("stiffness", "Stiffness", "Stiffness",
             "At 100 % a handle follows exactly. With less it gives way to the fluid and to other handles."),
     Setting("hold", "Hold", "Hold",
-            "At 0 % a long push lets go of the picture by and by. At 100 % it carries it as far as you go."),
+            "At 0 % a long push gradually lets go of the picture. At 100 % it carries it as far as you go."),
     Setting("local", "Local", "Local",
             "At 0 % the picture flows back beside the brush, as a fluid does. At 100 % only what is under it moves."),
 )  # fmt: skip
