@@ -357,16 +357,35 @@ def test_doctor_lists_the_graphics_devices(monkeypatch: pytest.MonkeyPatch):
     }  # fmt: skip
 
 
+WRITING = [
+    ["render", "a.toml", "-o", "x.png"],
+    ["apply", "m.npy", "cat.png", "-o", "x.png"],
+    ["convert", "m.npy", "-o", "x.exr", "--invert"],
+    ["fit", "a.toml", "-o", "x.toml"],
+    ["gallery", "-o", "x"],
+]
+
+
+@pytest.mark.parametrize("words", WRITING)
 @pytest.mark.parametrize(
-    "words",
-    [
-        ["render", "a.toml", "-o", "x.png"],
-        ["apply", "m.npy", "cat.png", "-o", "x.png"],
-        ["convert", "m.npy", "-o", "x.exr", "--invert"],
-        ["fit", "a.toml", "-o", "x.toml"],
-        ["gallery", "-o", "x"],
-    ],
+    ("output", "told"), [("-", "a result is a file, and not standard output (-)"), (".png", "is an ending without")]
 )
+def test_no_command_writes_to_what_is_no_name(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], words: list[str], output: str,
+    told: str,
+):  # fmt: skip
+    before = here(folder)
+    monkeypatch.chdir(folder)
+    words = [output if word.startswith("x") else word for word in words]
+    monkeypatch.setattr(sys, "argv", ["fluidwarp", *words])
+    with pytest.raises(SystemExit) as ended:
+        cli.main()
+    assert ended.value.code not in (0, None)
+    assert told in capsys.readouterr().err
+    assert here(folder) == before
+
+
+@pytest.mark.parametrize("words", WRITING)
 def test_a_device_is_chosen_and_one_that_is_not_there_is_told(
     folder: Path, fluidwarp: Run, monkeypatch: pytest.MonkeyPatch, words: list[str]
 ):
