@@ -94,3 +94,16 @@ def test_pushes_that_lie_on_one_another_do_no_more_together_than_one_may():
     assert sizes(found).max() <= 3
     for kind, bound in ((slice(0, 82), 1.0), (slice(82, 164), 3.0)):
         assert sizes(influence[:, kind] @ found[kind]).max() <= bound + 1e-9
+
+
+@pytest.mark.parametrize("rings", [0, 1])
+def test_wide_pushes_on_one_another_keep_the_bound_of_one_together(rings: int):
+    """Also where rings turn, whose turns have no bound."""
+    influence = np.zeros((2 + rings, 8 + rings))
+    influence[:2, :8] = np.tile(np.eye(2), 4)  # a narrow push, and three wide ones, all at the one place
+    influence[2:, 8:] = 1.0
+    shares = np.concatenate([np.full(2, 1e-9), np.ones(6 + rings)])
+    owners = np.zeros(2 + rings), np.zeros(8 + rings)
+    weighed = Balance(influence, np.full(2 + rings, 1e-9), shares, owners, np.ones(4), narrow=1)
+    found = weighed.strengths(np.array([6.0, 0.0, 0.5][: 2 + rings]))
+    np.testing.assert_allclose(found[2:8], np.tile([1 / 3, 0], 3), atol=1e-6)
