@@ -1,12 +1,10 @@
-"""The window: the only place that knows glfw. It turns callbacks into events, and hands the editor a framebuffer."""
+"""The window: it hands the editor events and a framebuffer. With `callbacks.py` the only place that knows glfw."""
 
 from __future__ import annotations
 
 import os
-import sys
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Sequence
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -17,8 +15,9 @@ import moderngl
 from app.errors import UserError
 from app.media.numbered import is_sequence
 from app.progress import interruptible, never
+from app.ui.callbacks import Callbacks
 from app.ui.editor import Editor
-from app.ui.events import Button, CloseWish, Drop, Event, Focus, Key, Mods, Move, Text, Wheel
+from app.ui.events import CloseWish, Drop
 from app.ui.files import load_any
 from app.ui.preferences import Preferences
 from app.work.recovery import default_folder
@@ -31,12 +30,6 @@ GRASP = 24  # of a window's height, that has to be on a screen for it to be got 
 FASTEST = 1 / 120  # seconds between two frames where the screen does not set the pace
 NO_DISPLAY = 2
 
-_NAMED = {
-    glfw.KEY_SPACE: "space", glfw.KEY_ESCAPE: "escape", glfw.KEY_ENTER: "enter", glfw.KEY_KP_ENTER: "enter",
-    glfw.KEY_TAB: "tab", glfw.KEY_BACKSPACE: "backspace", glfw.KEY_DELETE: "delete", glfw.KEY_LEFT: "left",
-    glfw.KEY_RIGHT: "right", glfw.KEY_UP: "up", glfw.KEY_DOWN: "down", glfw.KEY_HOME: "home", glfw.KEY_END: "end",
-    glfw.KEY_PAGE_UP: "pageup", glfw.KEY_PAGE_DOWN: "pagedown",
-} | {getattr(glfw, f"KEY_F{number}"): f"f{number}" for number in range(1, 13)}  # fmt: skip
 _CURSORS = {
     "arrow": glfw.ARROW_CURSOR, "hand": glfw.HAND_CURSOR, "crosshair": glfw.CROSSHAIR_CURSOR,
     "resize_ew": glfw.HRESIZE_CURSOR, "text": glfw.IBEAM_CURSOR,
@@ -93,13 +86,14 @@ class GlfwWindow:
         glfw.set_window_size_limits(self.handle, *smallest, glfw.DONT_CARE, glfw.DONT_CARE)
         self._go_to(place)
         glfw.show_window(self.handle)
-        self.events: list[Event] = []
-        self._held = Mods()
+        self.heard = Callbacks()
         self._title = TITLE
         self._cursor = "arrow"
         self._cursors: dict[str, Any] = {}
         self._must_draw = True
-        self._listen()
+        self.heard.listen(self.handle)
+        glfw.set_framebuffer_size_callback(self.handle, lambda *_: self._redraw())
+        glfw.set_window_refresh_callback(self.handle, lambda *_: self._redraw())
         loader: Any = _Loader()
         self.device = Device(moderngl.create_context(require=330, context=loader))
 
@@ -131,18 +125,15 @@ class GlfwWindow:
 
     def _go_to(self, place: Sequence[int]) -> None:
         """Be where the window was the last time, as far as a screen is there still."""
-        if not place:
+        screens = [glfw.get_monitor_workarea(monitor) for monitor in glfw.get_monitors()]
+        if (at := placed(place, screens)) is None:
             return
-        left, top, width, height, fills = place
-        for monitor in glfw.get_monitors():
-            x, y, across, down = glfw.get_monitor_workarea(monitor)
-            if x <= left + width / 2 < x + across and y <= top + GRASP <= y + down:
-                if fills:
-                    glfw.maximize_window(self.handle)
-                else:
-                    glfw.set_window_size(self.handle, min(width, across), min(height, down))
-                    glfw.set_window_pos(self.handle, left, max(top, y))
-                return
+        left, top, width, height, fills = at
+        if fills:
+            glfw.maximize_window(self.handle)
+        else:
+            glfw.set_window_size(self.handle, width, height)
+            glfw.set_window_pos(self.handle, left, top)
 
     def show(self, editor: Editor, cancel: Callable[[], bool] = never) -> None:
         """Run the editor until the person leaves, or `cancel` says so."""
@@ -154,17 +145,16 @@ class GlfwWindow:
         while not (editor.commands.closed or cancel()):
             self._wait(editor, cancel)
             if glfw.get_window_attrib(self.handle, glfw.ICONIFIED):
-                if any(isinstance(event, CloseWish) for event in self.events):
+                if any(isinstance(event, CloseWish) for event in self.heard.events):
                     if editor.commands.asks_before_quitting:
                         glfw.restore_window(self.handle)
                 elif not editor.dialogs.is_busy:
                     # What has happened waits too.
                     glfw.wait_events_timeout(0.1)
                     continue
-            events, self.events = self.events, []
             now = time.perf_counter()
             dt, last = now - last, now
-            editor.frame(screen, self.size, dt, events, self.density, self.scale)
+            editor.frame(screen, self.size, dt, self.heard.take(), self.density, self.scale)
             self._must_draw = False
             self._show_title(editor)
             self._show_cursor(editor.pointer.cursor)
@@ -186,7 +176,7 @@ class GlfwWindow:
         """Wait until there is something to draw."""
         glfw.poll_events()
         started = time.perf_counter()
-        while not (self.events or self._must_draw or cancel()):
+        while not (self.heard.events or self._must_draw or cancel()):
             left = editor.wait() - (time.perf_counter() - started)
             if left <= 0:
                 return
@@ -195,55 +185,10 @@ class GlfwWindow:
     def _has_news(self) -> bool:
         """Something has been pressed, or let go, since the frame that is being drawn began."""
         glfw.poll_events()
-        return any(
-            not (isinstance(event, (Move, Focus)) or (isinstance(event, Key) and event.repeat)) for event in self.events
-        )
-
-    def _listen(self) -> None:
-        handle = self.handle
-        glfw.set_cursor_pos_callback(handle, lambda _, x, y: self._add(Move(x, y, 1.0, self._held)))
-        glfw.set_cursor_enter_callback(handle, lambda _, inside: None if inside else self._left())
-        glfw.set_mouse_button_callback(handle, self._button)
-        glfw.set_scroll_callback(handle, lambda _, dx, dy: self._add(Wheel(dx, dy, self._held)))
-        glfw.set_key_callback(handle, self._key)
-        glfw.set_char_callback(handle, lambda _, code: self._add(Text(chr(code))))
-        on_drop: Any = lambda _, paths: self._add(Drop(tuple(paths)))  # noqa: E731
-        glfw.set_drop_callback(handle, on_drop)
-        glfw.set_window_focus_callback(handle, lambda _, focused: self._add(Focus(bool(focused))))
-        glfw.set_window_close_callback(handle, self._close_wish)
-        glfw.set_framebuffer_size_callback(handle, lambda *_: self._redraw())
-        glfw.set_window_refresh_callback(handle, lambda *_: self._redraw())
-
-    def _add(self, event: Event) -> None:
-        self.events.append(event)
+        return self.heard.are_news
 
     def _redraw(self) -> None:
         self._must_draw = True
-
-    def _left(self) -> None:
-        """The pointer left the window; a drag goes on outside."""
-        if not any(glfw.get_mouse_button(self.handle, button) for button in range(3)):
-            self._add(Move(-1e4, -1e4))
-
-    def _close_wish(self, handle: Any) -> None:
-        glfw.set_window_should_close(handle, False)
-        self._add(CloseWish())
-
-    def _button(self, handle: Any, button: int, action: int, mods: int) -> None:
-        if button <= glfw.MOUSE_BUTTON_MIDDLE:
-            self._held = _mods(mods)
-            self._add(Button(button, action == glfw.PRESS, self._held))
-
-    def _key(self, handle: Any, key: int, code: int, action: int, mods: int) -> None:
-        # Digits are where they are, whatever the layout prints on them; all other keys are what they print.
-        digit = chr(key) if glfw.KEY_0 <= key <= glfw.KEY_9 else None
-        name = _NAMED.get(key) or digit or glfw.get_key_name(key, code)
-        # A modifier's own event does not yet, or does still, have it among the modifiers.
-        self._held = _with_own(_mods(mods), key, action)
-        if name:
-            self._add(Key(name.lower(), action != glfw.RELEASE, self._held, action == glfw.REPEAT))
-        else:
-            self._add(Key("", action != glfw.RELEASE, self._held))
 
     def _show_title(self, editor: Editor) -> None:
         if editor.title != self._title:
@@ -279,7 +224,7 @@ def run(file: Path | None = None) -> None:
             editor = Editor(window.device, load_any(sample()), likes, default_folder())
             if file is not None:
                 editor.workspace.placeholder = editor.session
-                window.events.append(Drop((str(file),)))
+                window.heard.add(Drop((str(file),)))
             try:
                 window.show(editor, cancel)
             finally:
@@ -296,26 +241,31 @@ def sample() -> Path:
     return Path(str(resources.files("assets"))) / "sample.webp"
 
 
-def _mods(bits: int) -> Mods:
-    ctrl = glfw.MOD_SUPER if sys.platform == "darwin" else glfw.MOD_CONTROL
-    return Mods(bool(bits & ctrl), bool(bits & glfw.MOD_SHIFT), bool(bits & glfw.MOD_ALT))
+def placed(place: Sequence[int], screens: Iterable[Sequence[int]]) -> list[int] | None:
+    """Where a window can be got hold of that was at `place`; None if no screen is there any more, or it was nowhere.
 
-
-def _with_own(mods: Mods, key: int, action: int) -> Mods:
-    down = action != glfw.RELEASE
-    own = {
-        glfw.KEY_LEFT_ALT: "alt", glfw.KEY_RIGHT_ALT: "alt", glfw.KEY_LEFT_SHIFT: "shift",
-        glfw.KEY_RIGHT_SHIFT: "shift", glfw.KEY_LEFT_CONTROL: "ctrl", glfw.KEY_RIGHT_CONTROL: "ctrl",
-    }.get(key)  # fmt: skip
-    return replace(mods, **{own: down}) if own else mods
+    Args:
+        place: left, top, width, height, and whether it filled the screen.
+        screens: left, top, width and height of what each has room for.
+    """
+    if not place:
+        return None
+    left, top, width, height, fills = place
+    for x, y, across, down in screens:
+        if x <= left + width / 2 < x + across and y <= top + GRASP <= y + down:
+            return [left, max(top, y), min(width, across), min(height, down), fills]
+    return None
 
 
 def _fitting(size: tuple[int, int]) -> tuple[int, int]:
     """The size, or what of it the screen has room for."""
     monitor = glfw.get_primary_monitor()
-    if not monitor:
-        return size
-    _, _, width, height = glfw.get_monitor_workarea(monitor)
+    return fitting(size, glfw.get_monitor_workarea(monitor)) if monitor else size
+
+
+def fitting(size: tuple[int, int], screen: Sequence[int]) -> tuple[int, int]:
+    """The size, or what of it a screen (left, top, width, height) has room for; one that says nothing has all."""
+    _, _, width, height = screen
     return min(size[0], width or size[0]), min(size[1], height or size[1])
 
 
