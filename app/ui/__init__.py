@@ -1,1 +1,1 @@
-"""The window: everything that knows imgui, and, in `window.py` alone, glfw."""
+"""The window: everything that knows imgui, and, in `window.py` and `callbacks.py` alone, glfw."""
