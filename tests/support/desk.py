@@ -220,6 +220,13 @@ class Desk:
             ended.set()
             others.join()
 
+    def leave(self) -> None:
+        """Quit; again where something that had not ended, such as an export, was asked about first."""
+        editor = self.editor
+        assert editor is not None
+        self.insist(lambda: self.key("ctrl+q"), lambda: editor.poll() is not None, "the editor to end")
+        self.until_gone()
+
     def until_gone(self) -> None:
         """Wait until the editor has ended by itself, and well."""
         assert self.editor is not None

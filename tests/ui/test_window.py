@@ -66,12 +66,10 @@ def test_a_whole_session(desk: Desk, tmp_path: Path, fluidwarp: Run) -> None:
         desk.key("Return")
 
     desk.insist(export, exported.exists, "the export")
-    desk.key("ctrl+q")
-    desk.until_gone()
+    desk.leave()
 
     desk.open(work)
-    desk.key("ctrl+q")
-    desk.until_gone()
+    desk.leave()
     rendered = tmp_path / "rendered.png"
     assert fluidwarp(tmp_path, "render", work.name, "-o", rendered.name).returncode == 0
     assert np.array_equal(read_picture(exported).pixels, read_picture(rendered).pixels)
@@ -142,11 +140,9 @@ def test_a_killed_editor_gives_the_work_back(desk: Desk, tmp_path: Path) -> None
     desk.save(work)
     assert repr(projects.load(work).recipe) == repr(found.work.recipe)
     assert list(journals.iterdir()) == []
-    desk.key("ctrl+q")
-    desk.until_gone()
+    desk.leave()
     desk.open(work)  # and is asked nothing
-    desk.key("ctrl+q")
-    desk.until_gone()
+    desk.leave()
 
 
 def close_minimised(desk: Desk) -> None:
@@ -174,8 +170,7 @@ def test_the_window_comes_back_as_it_was_left_and_a_minimised_one_is_closed_at_o
     desk.key("ctrl+l")
     desk.key("Tab")
     desk.key("bracketright")
-    desk.key("ctrl+q")
-    desk.until_gone()
+    desk.leave()
     desk.open_pattern()
     wanted = {"X": "140", "Y": "70", "WIDTH": "900", "HEIGHT": "610"}
 
