@@ -42,8 +42,8 @@ from support.golden import Golden, Sum
 from support.widgets import Widgets
 
 CLOSE = 2e-3
-STEPS = 60
-WORKS = 36
+STEPS = 52
+WORKS = 32
 HANDS = (  # what is in hand, points as dense and as large as so many, and the zoom
     ("push", 1.0, 1.0, None),
     ("select", 2.0, 1.0, 3.0),
