@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from imgui_bundle import imgui
 
 from app.errors import UserError
 from app.media.animation import animation_writer
@@ -38,21 +39,20 @@ from app.ui.preferences import Preferences
 from app.work import playing, recording
 from solver.gl.device import Device
 from support.editing import Robot, pattern, small_project, summary
-from support.golden import Golden, Sum
+from support.golden import WRITES, Golden, Sum
 from support.widgets import Widgets
 
 CLOSE = 2e-3
-STEPS = 52
-WORKS = 32
-HANDS = (  # what is in hand, points as dense and as large as so many, and the zoom
-    ("push", 1.0, 1.0, None),
-    ("select", 2.0, 1.0, 3.0),
-    ("handle", 1.0, 2.0, None),
-    ("zoom", 1.5, 1.25, 0.7),
+WORKS = 24
+HANDS = (  # what is mostly in hand, pixels a point, the interface's size, the zoom, and how many events there are
+    ("push", 1.0, 1.0, None, 64),
+    ("select", 2.0, 1.0, 3.0, 100),
+    ("handle", 1.0, 2.0, None, 36),
+    ("zoom", 1.5, 1.25, 0.7, 64),
 )
-DONE = sorted(name for name, action in ACTIONS.items() if not action.label.endswith("...") and name not in (
-    "save", "copy_picture", "copy_recipe", "paste", "fit_handles", "quit", "statistics"))  # fmt: skip
-"""Actions that want no file, no other process and no clipboard; times are told by the last."""
+APART = ("save", "copy_picture", "copy_recipe", "paste", "fit_handles", "quit", "statistics")
+DONE = sorted(a.name for a in ACTIONS.values() if a.name not in APART and a.group != "Tools" and a.label[-1] != ".")
+"""Actions but the choice of a tool that want no file, no process and no clipboard; times are told by the last."""
 
 
 def now(robot: Robot) -> dict[str, Any]:
@@ -82,14 +82,14 @@ def now(robot: Robot) -> dict[str, Any]:
 class Hand:
     """Sends one event after the other, as they come to it by chance."""
 
-    def __init__(self, robot: Robot, dice: Random) -> None:
-        self.robot, self.dice = robot, dice
+    def __init__(self, robot: Robot, dice: Random, tool: str) -> None:
+        self.robot, self.dice, self.tool, self.button = robot, dice, tool, LEFT
 
     def place(self) -> tuple[float, float]:
         """A point of the window: of the picture, on a mark or the split's line, or anywhere."""
         editor, dice = self.robot.editor, self.dice
         marks, split = editor.session.marks, editor.state.split
-        match dice.choice(("picture", "picture", "picture", "mark", "split", "window", "outside")):
+        match dice.choice(("picture",) * 8 + ("mark",) * 3 + ("split", "window", "outside")):
             case "mark" if marks:
                 return editor.view.to_screen(*dice.choice(marks).now)
             case "split" if split is not None:
@@ -105,42 +105,47 @@ class Hand:
 
     def event(self) -> Event:
         dice, mods = self.dice, self.robot.mods
-        match dice.choice(
-            ("move",) * 7 + ("down",) * 3 + ("up",) * 3 + ("wheel", "key", "focus", "held", "held", "back")
-        ):
+        begun = self.robot.editor.pointer.drag is not None
+        usual = ("move", "move", "move", "up", "up") if begun else ("move", "down", "down")
+        match dice.choice((*usual * 3, "wheel", "key", "focus", "held", "held", "back")):
             case "move":
                 x, y = self.place()
                 return Move(round(x, 1), round(y, 1), round(dice.random(), 2), mods)
             case "down":
-                return Button(dice.choice((LEFT, LEFT, LEFT, RIGHT, MIDDLE)), True, mods)
+                self.button = dice.choice((LEFT, LEFT, LEFT, LEFT, RIGHT, MIDDLE))
+                return Button(self.button, True, mods)
             case "up":
-                return Button(dice.choice((LEFT, LEFT, LEFT, RIGHT, MIDDLE)), False, mods)
+                return Button(dice.choice((self.button,) * 6 + (LEFT, RIGHT, MIDDLE)), False, mods)
             case "wheel":
                 return Wheel(dice.choice((0, 0, 1)), dice.choice((-1, 1, 2)), mods)
             case "focus":
                 return Focus(dice.random() < 0.4)
             case "held":
-                return Key(dice.choice(("space", "\\")), dice.random() < 0.5, mods, dice.random() < 0.2)
+                is_held = {"space": self.robot.editor.pointer.space, "\\": self.robot.editor.state.before}
+                key = next((key for key in is_held if is_held[key]), dice.choice(sorted(is_held)))
+                return Key(key, dice.random() < (0.2 if is_held[key] else 0.8), mods, dice.random() < 0.2)
             case "back":
-                return Key(dice.choice(("escape", "ctrl+z", "delete")).removeprefix("ctrl+"), True, Mods(), False)
+                return Key(dice.choice(("escape", "z", "delete")), True, dice.choice((Mods(), Mods(ctrl=True))))
         return Key(dice.choice("yim=-][u"), True, mods)
 
     def step(self) -> None:
         dice, robot, state = self.dice, self.robot, self.robot.editor.state
         if dice.random() < 0.3:
             robot.mods = Mods(*(dice.random() < 0.25 for _ in range(3)))
-        if dice.random() < 0.1:
-            state.choose_tool(dice.choice(TOOLS).name, dice.random() < 0.3)
-        if dice.random() < 0.1:
+        if dice.random() < 0.2:
+            state.choose_tool(
+                dice.choice((self.tool, self.tool, self.tool, dice.choice(TOOLS).name)), dice.random() < 0.3
+            )
+        if dice.random() < 0.2:
             state.select_by = dice.choice(
                 [way for way in SELECT_BY if way != "subject"]
             )  # which takes a thread its time
         if dice.random() < 0.06:
-            state.symmetry = dice.choice(("none", "x", "both", "radial"))
+            state.symmetry = dice.choice(("none", "left-right", "both", "radial"))
             state.stabiliser = dice.choice((0.0, 25.0))
         if dice.random() < 0.04:
             robot.key("ctrl+,")
-        if dice.random() < 0.2:
+        if dice.random() < 0.15:
             robot.editor.do(dice.choice(DONE))
         robot.frame(event := self.event(), dt=dice.choice((1 / 30, 1 / 30, 0.6)))
         pointer, session = robot.editor.pointer, robot.editor.session
@@ -155,6 +160,14 @@ def golden(shared_device: Device) -> Iterator[Golden]:
         yield golden
 
 
+def named(golden: Golden, walk: str) -> str:
+    """What the rows of a walk begin with; it is skipped where none do."""
+    name = f"{imgui.get_version()} {walk}"
+    if not WRITES and not golden.has(name):
+        pytest.skip("letters lie elsewhere in other versions of imgui")
+    return name
+
+
 @pytest.fixture(autouse=True)
 def a_tick_a_frame(monkeypatch: pytest.MonkeyPatch) -> None:
     """However fast the machine is."""
@@ -167,17 +180,18 @@ def a_tick_a_frame(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_any_events_in_any_order_lead_where_they_did(
     device: Device, tmp_path: Path, number: int, golden: Golden
 ) -> None:
-    tool, density, scale, zoom = HANDS[number]
-    dice, found = Random(f"hand {number}"), dict[str, list[float]]()
-    with Robot(device, small_project(tmp_path, 32), (1100, 720), scale, density=density) as robot:
+    tool, density, scale, zoom, steps = HANDS[number]
+    name, dice, found = named(golden, f"hand {number}"), Random(f"hand {number}"), dict[str, list[float]]()
+    with Robot(device, small_project(tmp_path, 24), (1100, 720), scale, density=density) as robot:
         editor, state = robot.editor, robot.editor.state
-        handle, pin = RecipeHandle(at=(0.4, 0.6), to=(0.5, 0.7), duration=0.1), RecipePin(at=(0.8, 0.2))
-        editor.session.edit("Handles", handle=(handle,), pin=(pin,), duration=0.2)
+        if tool == "handle":
+            handle, pin = RecipeHandle(at=(0.4, 0.6), to=(0.5, 0.7), duration=0.1), RecipePin(at=(0.8, 0.2))
+            editor.session.edit("Handles", handle=(handle,), pin=(pin,), duration=0.2)
         state.choose_tool(tool, False)
         if zoom is not None:
             editor.commands.zoom_to(zoom)
-        hand, what = Hand(robot, dice), Sum()
-        for step in range(1, STEPS + 1):
+        hand, what = Hand(robot, dice, tool), Sum()
+        for step in range(1, steps + 1):
             hand.step()
             if not editor.session.is_painting:
                 editor.session.settle()
@@ -185,8 +199,8 @@ def test_any_events_in_any_order_lead_where_they_did(
                 robot.key("escape")
             what.add(now(robot))
             if step % 4 == 0:
-                found[f"hand {number} {step}"], what = what.row, Sum()
-    golden.compare_all(found, f"hand {number} ", CLOSE)
+                found[f"{name} {step}"], what = what.row, Sum()
+    golden.compare_all(found, f"{name} ", CLOSE)
 
 
 def files_in(folder: Path) -> None:
@@ -286,7 +300,7 @@ def test_works_that_are_opened_in_between_lead_where_they_did(
         return recipe.edited(fluid=recipe.fluid.model_copy(update={"grid": 16}))
 
     monkeypatch.setattr(files, "fresh_recipe", coarse)
-    dice, found = Random(f"works {number}"), dict[str, list[float]]()
+    name, dice, found = named(golden, f"works {number}"), Random(f"works {number}"), dict[str, list[float]]()
     files_in(tmp_path)
     likes = Preferences(auto_quality=False, embed=number == 0)
     with Robot(device, small_project(tmp_path, 16), (900, 600), preferences=likes) as robot:
@@ -300,5 +314,5 @@ def test_works_that_are_opened_in_between_lead_where_they_did(
             told = [message.text.replace(str(tmp_path), "FOLDER") for message in editor.messages.shown]
             what.add(now(robot) | {"messages": told})
             if step % 4 == 0:
-                found[f"works {number} {step}"], what = what.row, Sum()
-    golden.compare_all(found, f"works {number} ", CLOSE)
+                found[f"{name} {step}"], what = what.row, Sum()
+    golden.compare_all(found, f"{name} ", CLOSE)
