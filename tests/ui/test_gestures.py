@@ -25,9 +25,9 @@ from app.media.project import from_picture, save
 from app.model.forces import VortexForce
 from app.model.handles import RecipeHandle, RecipePin
 from app.model.picture import Picture
-from app.model.presets import BRUSHES
+from app.model.presets import BRUSHES, PUTTY
 from app.model.recipe import FluidSettings, Recipe
-from app.model.strokes import Stroke
+from app.model.strokes import Change, Stroke
 from app.model.tools import TOOLS
 from app.ui import files
 from app.ui.actions import ACTIONS
@@ -217,7 +217,12 @@ def files_in(folder: Path) -> None:
     whirl = VortexForce(kind="vortex", point=(0.5, 0.5), strength=0.1)
     (folder / "forces.toml").write_text(recipe.edited(force=(whirl,)).text(), "utf-8")
     stroke = Stroke(tool="push", samples=((0, 0.3, 0.5, 1.0), (9, 0.6, 0.5, 1.0)))
-    save(from_picture(folder / "clear.png", recipe.edited(stroke=(stroke,))), folder / "kept.fluidwarp", True)
+    putty = Change(tick=6, viscosity=PUTTY.viscosity, drag=PUTTY.drag)
+    save(
+        from_picture(folder / "clear.png", recipe.edited(stroke=(stroke,), change=(putty,))),
+        folder / "kept.fluidwarp",
+        True,
+    )
     (folder / "none.png").write_text("no picture")
 
 

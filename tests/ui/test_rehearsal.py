@@ -64,7 +64,7 @@ PARTS_OF: dict[str, dict[str, Any]] = {
     "pin": {"at": (0.4, 0.5)},
     "mask": {"kind": "fill", "tick": 0, "of": "frozen", "amount": 1.0},
     "viscosity": {"kind": "constant", "scale": 0.05},
-    "freeze": {"window": {"box": (0.1, 0.1, 0.5, 0.5)}},
+    "freeze": {"kind": "constant", "window": {"box": (0.1, 0.1, 0.5, 0.5)}},
     "force": {"kind": "vortex", "point": (0.5, 0.5), "strength": 0.1},
 }
 
