@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from itertools import product
 from typing import Any
@@ -9,9 +10,10 @@ from typing import Any
 import glfw
 import pytest
 
+from app.errors import UserError
 from app.ui import window
 from app.ui.actions import ACTIONS
-from app.ui.events import LEFT, MIDDLE, RIGHT, Button, CloseWish, Event, Key, Mods, Move
+from app.ui.events import LEFT, MIDDLE, RIGHT, Button, CloseWish, Drop, Event, Focus, Key, Mods, Move, Text, Wheel
 from app.ui.window import GlfwWindow
 
 NAMES = {
@@ -33,30 +35,70 @@ def bits(held: dict[str, bool]) -> int:
     return sum(bit for name, bit in BITS.items() if held[name])
 
 
+class System:
+    """GLFW's constants, and its functions as notes of how they were called: a window without a screen."""
+
+    def __init__(self) -> None:
+        self.told: dict[str, list[tuple[Any, ...]]] = {}
+        self.says: dict[str, Any] = {
+            "get_key_name": lambda key, code: {glfw.KEY_Y: "Z", glfw.KEY_1: "&"}.get(key),
+            "get_monitor_workarea": lambda monitor: AREAS[monitor],
+            "get_window_size": lambda handle: (1280, 800),
+            "get_framebuffer_size": lambda handle: (1280, 800),
+            "get_window_content_scale": lambda handle: (1.0, 1.0),
+            "get_primary_monitor": lambda: None,
+            "get_monitors": lambda: list(AREAS)[:2],
+            "get_mouse_button": lambda handle, button: glfw.RELEASE,
+        }
+
+    def __getattr__(self, name: str) -> Any:
+        if name.isupper():
+            return getattr(glfw, name)
+
+        def called(*given: Any) -> Any:
+            self.told.setdefault(name, []).append(given[1:])
+            return self.says[name](*given) if name in self.says else True
+
+        return called
+
+    def call(self, what: str, *given: Any) -> None:
+        """Call back what is called for an event."""
+        self.told[f"set_{what}_callback"][-1][0](None, *given)
+
+
+AREAS = {"one": (0, 30, 1000, 700), "two": (1000, 30, 1000, 700), "small": (0, 0, 1000, 900), "none": (0, 0, 0, 0)}
+
+
 @pytest.fixture
-def quiet(monkeypatch: pytest.MonkeyPatch) -> Any:
-    """A window's part that hears, of no window of the system; what a layout prints on a key is on none."""
-    monkeypatch.setattr(glfw, "get_key_name", lambda key, code: {glfw.KEY_Y: "Z", glfw.KEY_1: "&"}.get(key))
-    heard = object.__new__(GlfwWindow)
-    heard.events, heard._held, heard.handle = list[Event](), Mods(), None
-    return heard
+def system(monkeypatch: pytest.MonkeyPatch) -> System:
+    system = System()
+    monkeypatch.setattr(window, "glfw", system)
+    monkeypatch.setattr(window, "Device", lambda context: None)
+    monkeypatch.setattr(window.moderngl, "create_context", lambda **given: None)
+    return system
+
+
+@pytest.fixture
+def quiet(system: System) -> GlfwWindow:
+    return GlfwWindow()
 
 
 @pytest.mark.parametrize("held", HELD, ids=lambda held: "+".join(name for name in held if held[name]) or "none")
-def test_each_key_has_its_name_and_the_modifiers_that_are_held(quiet: Any, held: dict[str, bool]) -> None:
+def test_each_key_has_its_name_and_the_modifiers_that_are_held(
+    quiet: GlfwWindow, system: System, held: dict[str, bool]
+) -> None:
     wanted = list[Event]()
     for name, keys in NAMES.items():
         for key in keys.split():
             for action in (glfw.PRESS, glfw.REPEAT, glfw.RELEASE):
-                quiet._key(None, getattr(glfw, f"KEY_{key}"), 0, action, bits(held))
+                system.call("key", getattr(glfw, f"KEY_{key}"), 0, action, bits(held))
                 wanted.append(Key(name, action != glfw.RELEASE, Mods(**held), action == glfw.REPEAT))
-    quiet._key(None, glfw.KEY_Y, 0, glfw.PRESS, bits(held))
+    system.call("key", glfw.KEY_Y, 0, glfw.PRESS, bits(held))
     wanted.append(Key("z", True, Mods(**held)))
     for key, own in OWN.items():
         for action in (glfw.PRESS, glfw.RELEASE):
-            quiet._key(None, getattr(glfw, f"KEY_{key}"), 0, action, bits(held))
+            system.call("key", getattr(glfw, f"KEY_{key}"), 0, action, bits(held))
             wanted.append(Key("", action == glfw.PRESS, Mods(**held | {own: action == glfw.PRESS})))
-            assert quiet._held == wanted[-1].mods  # pyright: ignore[reportAttributeAccessIssue]
     assert quiet.events == wanted
 
 
@@ -65,10 +107,10 @@ def test_all_keys_that_do_something_have_a_name() -> None:
     assert {key for key in chords if len(key) > 1} <= set(NAMES)
 
 
-def test_three_buttons_are_heard_with_what_is_held_and_no_other(quiet: Any) -> None:
+def test_three_buttons_are_heard_with_what_is_held_and_no_other(quiet: GlfwWindow, system: System) -> None:
     for button in range(8):
         for action, held in product((glfw.PRESS, glfw.RELEASE), HELD):
-            quiet._button(None, button, action, bits(held))
+            system.call("mouse_button", button, action, bits(held))
     assert quiet.events == [
         Button(button, action == glfw.PRESS, Mods(**held))
         for button in (LEFT, RIGHT, MIDDLE)
@@ -77,11 +119,11 @@ def test_three_buttons_are_heard_with_what_is_held_and_no_other(quiet: Any) -> N
 
 
 @pytest.mark.parametrize("down", [None, 0, 1, 2])
-def test_a_pointer_that_leaves_is_nowhere_unless_it_drags(
-    quiet: Any, monkeypatch: pytest.MonkeyPatch, down: int | None
-) -> None:
-    monkeypatch.setattr(glfw, "get_mouse_button", lambda handle, button: glfw.PRESS if button == down else glfw.RELEASE)
-    quiet._left()
+def test_a_pointer_that_leaves_is_nowhere_unless_it_drags(quiet: GlfwWindow, system: System, down: int | None) -> None:
+    system.says["get_mouse_button"] = lambda handle, button: glfw.PRESS if button == down else glfw.RELEASE
+    system.call("cursor_enter", True)
+    assert not quiet.events
+    system.call("cursor_enter", False)
     assert len(quiet.events) == (down is None)
     if quiet.events:
         left = quiet.events[0]
@@ -89,31 +131,20 @@ def test_a_pointer_that_leaves_is_nowhere_unless_it_drags(
         assert max(left.x, left.y) < 0
 
 
-def test_a_window_that_shall_close_stays_and_asks(quiet: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    told: list[object] = []
-    monkeypatch.setattr(glfw, "set_window_should_close", lambda *given: told.append(given))
-    quiet._close_wish("handle")
-    assert (told, quiet.events) == ([("handle", False)], [CloseWish()])
-
-
-@pytest.mark.parametrize(
-    ("event", "is_news"),
-    [
-        (Button(LEFT, True), True),
-        (Button(LEFT, False), True),
-        (Key("a", True), True),
-        (Key("a", False), True),
-        (Key("a", True, repeat=True), False),
-        (Move(1, 2), False),
-        (CloseWish(), True),
-    ],
-    ids=repr,
-)
-def test_what_is_pressed_or_let_go_is_news(
-    quiet: Any, monkeypatch: pytest.MonkeyPatch, event: Event, is_news: bool
-) -> None:
-    monkeypatch.setattr(glfw, "poll_events", lambda: quiet.events.append(event))
-    assert quiet._has_news() == is_news
+def test_all_else_that_happens_is_heard_with_what_is_held(quiet: GlfwWindow, system: System) -> None:
+    system.call("key", glfw.KEY_LEFT_ALT, 0, glfw.PRESS, 0)
+    system.call("cursor_pos", 3.0, 4.0)
+    system.call("scroll", 1.0, -2.0)
+    system.call("char", ord("a"))
+    system.call("drop", ["a.png", "b.png"])
+    system.call("window_focus", 0)
+    system.call("window_close")
+    held = Mods(alt=True)
+    assert quiet.events[1:] == [
+        Move(3.0, 4.0, 1.0, held), Wheel(1.0, -2.0, held), Text("a"), Drop(("a.png", "b.png")), Focus(False),
+        CloseWish(),
+    ]  # fmt: skip
+    assert system.told["set_window_should_close"] == [(False,)]
 
 
 PLACES = {
@@ -133,46 +164,25 @@ PLACES = {
 
 
 @pytest.mark.parametrize("name", PLACES)
-def test_a_window_comes_back_where_a_screen_is_still(quiet: Any, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+def test_a_window_comes_back_where_a_screen_is_still(system: System, name: str) -> None:
     place, *wanted = PLACES[name]
-    areas = {"one": (0, 30, 1000, 700), "two": (1000, 30, 1000, 700)}
-    told: dict[str, object] = {}
-    monkeypatch.setattr(glfw, "get_monitors", lambda: list(areas))
-    monkeypatch.setattr(glfw, "get_monitor_workarea", areas.__getitem__)
-    monkeypatch.setattr(glfw, "set_window_size", lambda handle, *size: told.update(size=size))
-    monkeypatch.setattr(glfw, "set_window_pos", lambda handle, *at: told.update(at=at))
-    monkeypatch.setattr(glfw, "maximize_window", lambda handle: told.update(fills=True))
-    quiet._go_to(place)
-    assert [told.get("size"), told.get("at"), told.get("fills", False)] == wanted
+    GlfwWindow(place)
+    told = system.told
+    size = told["set_window_size"][1:]  # the first is its own
+    found = [size[0] if size else None, *told.get("set_window_pos", [None]), "maximize_window" in told]
+    assert found == wanted
 
 
-def test_a_cursor_is_made_once_and_set_where_it_changes(quiet: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    made, given = list[object](), list[object]()
-    quiet._cursor, quiet._cursors = "arrow", {}
-    monkeypatch.setattr(glfw, "create_cursor", lambda *_: made.append("none") or "none")
-    monkeypatch.setattr(glfw, "create_standard_cursor", lambda shape: made.append(shape) or shape)
-    monkeypatch.setattr(glfw, "set_cursor", lambda handle, cursor: given.append(cursor))
-    for name in ("arrow", "none", "none", "hand", "crosshair", "resize_ew", "arrow", "none", "hand"):
-        quiet._show_cursor(name)
-    shapes = [glfw.HAND_CURSOR, glfw.CROSSHAIR_CURSOR, glfw.HRESIZE_CURSOR, glfw.ARROW_CURSOR]
-    assert made == ["none", *shapes]
-    assert given == ["none", *shapes, "none", glfw.HAND_CURSOR]
-
-
-@pytest.mark.parametrize(
-    ("screen", "wanted"), [(None, (1280, 800)), ((0, 0, 1000, 900), (1000, 800)), ((0, 0, 0, 0), (1280, 800))]
-)
-def test_a_window_is_no_larger_than_the_screen(
-    monkeypatch: pytest.MonkeyPatch, screen: tuple[int, ...] | None, wanted: tuple[int, int]
-) -> None:
-    monkeypatch.setattr(glfw, "get_primary_monitor", lambda: screen)
-    monkeypatch.setattr(glfw, "get_monitor_workarea", lambda monitor: monitor)
-    assert window._fitting((1280, 800)) == wanted
+@pytest.mark.parametrize(("screen", "wanted"), [(None, (1280, 800)), ("small", (1000, 800)), ("none", (1280, 800))])
+def test_a_window_is_no_larger_than_the_screen(system: System, screen: str | None, wanted: tuple[int, int]) -> None:
+    system.says["get_primary_monitor"] = lambda: screen
+    system.says["create_window"] = lambda *size: system.told.setdefault("made", []).append(size[:2]) or "window"
+    GlfwWindow()
+    assert (system.told["made"], system.told["set_window_size"]) == ([wanted], [wanted])
 
 
 @pytest.mark.parametrize("words", [b"X11: no display", "GLX: no display", "Wayland: no display", b"no display"])
-def test_why_there_is_no_window_is_told_without_the_library_s_words(
-    monkeypatch: pytest.MonkeyPatch, words: str | bytes
-) -> None:
-    monkeypatch.setattr(glfw, "get_error", lambda: (1, words))
-    assert window._why().startswith("no window can be opened here (no display). ")
+def test_why_there_is_no_window_is_told_without_the_library_s_words(system: System, words: str | bytes) -> None:
+    system.says |= {"init": lambda: False, "get_error": lambda: (1, words)}
+    with pytest.raises(UserError, match=re.escape("no window can be opened here (no display). ")):
+        GlfwWindow()
