@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from app.media.pictures import read_picture, write_picture
-from app.media.project import load
+from app.media.project import from_picture, load, save
 from app.model.handles import RecipePin
 from app.model.picture import Picture
 from app.ui.browser import Browser
-from app.ui.events import LEFT, MIDDLE, RIGHT
+from app.ui.events import LEFT, MIDDLE, RIGHT, CloseWish
+from app.ui.preferences import Preferences
 from app.ui.saving import SaveDialog
+from app.ui.widgets import Ui
 from support.editing import Robot, pattern, write_foreign_map
 from support.widgets import Widgets
 
@@ -183,3 +186,71 @@ def test_what_is_copied_as_a_recipe_is_the_recipe(robot: Robot) -> None:
     robot.editor.do("copy_recipe")
     assert copied == [robot.editor.session.recipe.text()]
     assert robot.editor.messages.shown[-1].text == "The recipe is on the clipboard, as TOML."
+
+
+@pytest.mark.parametrize("has_a_file", [True, False], ids=["with a file", "without one"])
+@pytest.mark.parametrize("what", ["quit", "open"])
+def test_what_unsaved_work_was_asked_about_for_is_done_once_it_is_saved_and_never_where_saving_is_given_up(
+    robot: Robot, widgets: Widgets, tmp_path: Path, what: str, has_a_file: bool
+) -> None:
+    editor, session = robot.editor, robot.editor.session
+    editor.preferences.folder = str(tmp_path)
+    write_picture(tmp_path / "other.png", pattern(60, 40))
+    if has_a_file:
+        assert editor.files.save_as(tmp_path / "pattern.fluidwarp")
+    session.edit("A pin", pin=(RecipePin(at=(0.5, 0.5)),))
+
+    def is_done() -> bool:
+        return editor.commands.closed if what == "quit" else editor.session.project.name == "other"
+
+    all_answers = [["Cancel"], ["Save"]] if has_a_file else [["Cancel"], ["Save", "Cancel"], ["Save", "Save"]]
+    for answers in all_answers:
+        assert (is_done(), editor.workspace.is_dirty, editor.dialogs.shown) == (False, True, [])
+        robot.frame(CloseWish()) if what == "quit" else robot.drop(tmp_path / "other.png")
+        for answer in answers:
+            widgets.click(answer)
+    assert is_done()
+    assert (session.document.is_dirty, load(tmp_path / "pattern.fluidwarp").recipe.pin) == (False, session.recipe.pin)
+
+
+@pytest.mark.parametrize("likes", [True, False], ids=["likes it inside", "likes it beside"])
+@pytest.mark.parametrize(("kind", "embeds"), [("picture", None), ("kept", True), ("clip", False)])
+def test_a_picture_is_asked_about_unless_it_is_only_in_the_project_or_a_clip(
+    robot: Robot,
+    widgets: Widgets,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    kind: str,
+    embeds: bool | None,
+    likes: bool,
+) -> None:
+    told, written = list[str](), list[bool]()
+    wrapped, project = Ui.wrapped, robot.editor.session.project
+    if kind == "kept":
+        project = load(Path(save(project, tmp_path / "kept.fluidwarp", True).path or ""))
+    elif kind == "clip":
+        for number in range(2):
+            write_picture(tmp_path / f"f.{number:04}.png", pattern(48, 36))
+        project = from_picture(tmp_path / "f.%04d.png", project.recipe)
+
+    def noting(ui: Ui, text: str, *more: Any) -> None:
+        told.append(text)
+        wrapped(ui, text, *more)
+
+    def note(path: Path, embed: bool) -> None:
+        written.append(embed)
+
+    monkeypatch.setattr(Ui, "wrapped", noting)
+    preferences = Preferences(embed=likes)
+    asked = SaveDialog(project, tmp_path / "a.fluidwarp", preferences, robot.editor.chooser, note, None)
+    robot.editor.dialogs.show(asked)
+    robot.frame(count=2)
+    embed = likes if embeds is None else embeds
+    about = {
+        "picture": "One file that opens anywhere" if likes else "A small file that needs",
+        "kept": "The picture is only in the project",
+        "clip": "A clip is never kept inside",
+    }
+    assert told[-1].startswith(about[kind])
+    widgets.click("Save")
+    assert (written, preferences.embed) == ([embed], likes)

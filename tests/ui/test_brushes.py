@@ -14,7 +14,9 @@ import pytest
 from app.gallery import retouching
 from app.media.pictures import write_picture
 from app.media.project import from_picture
-from app.model.presets import BRUSHES
+from app.model.presets import BRUSHES, PUTTY
+from app.model.strokes import Change, Stroke
+from app.model.tools import BrushSettings
 from app.ui.editor_state import LIMITS, SMALLEST, EditorState, presets
 from app.ui.events import RIGHT
 from app.ui.files import fresh_recipe
@@ -180,3 +182,16 @@ def test_a_hand_that_shakes_draws_a_calm_stroke(robot: Robot) -> None:
         robot.rest()
     assert lengths[0] > 1.35 * 240
     assert lengths[1] < 1.03 * 240
+
+
+@pytest.mark.parametrize("is_changed", [False, True])
+def test_pushes_are_as_local_as_suits_the_fluid_where_the_playhead_is(robot: Robot, is_changed: bool) -> None:
+    """Not as it is where the work begins, from which it is played when it is opened."""
+    editor = robot.editor
+    stroke = Stroke(tool="push", samples=((0, 0.3, 0.5, 1.0), (9, 0.6, 0.5, 1.0)))
+    putty = Change(tick=6, viscosity=PUTTY.viscosity, drag=PUTTY.drag)
+    editor.session.edit("Strokes", stroke=(stroke,), change=(putty,) * is_changed, duration=0.5)
+    project = replace(editor.session.project, recipe=editor.session.document.recipe)
+    editor.open(project)
+    assert editor.session.tick < putty.tick < editor.session.target
+    assert editor.state.brush.local == (PUTTY.local if is_changed else BrushSettings.local)

@@ -5,14 +5,26 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from random import Random
 from typing import Any, Literal
 
+import moderngl
 import numpy as np
 import pytest
 
+from app.media.pictures import write_picture
+from app.media.project import from_picture
+from app.model.forces import PointForce
+from app.model.mask_edits import MaskStroke
 from app.model.picture import Picture, srgb_to_linear
+from app.model.recipe import FluidSettings, Recipe
+from app.model.strokes import Stroke
 from app.ui.canvas import EDGES, Canvas, largest_shown, shown_pixels
+from app.ui.editor_state import EditorState
+from app.ui.theme import PALETTES
+from app.ui.viewport import Rect, Viewport
 from app.ui.widgets import Ui
+from app.work.session import Session
 from solver.gl.device import Device
 from support.editing import Robot, pattern, small_project
 from support.golden import Golden, told
@@ -192,6 +204,80 @@ def test_at_100_percent_a_pixel_of_the_picture_is_one_of_the_screen(robot: Robot
     left, top, (height, width) = round(rect.x), round(rect.y), pixels.shape[:2]
     seen = robot.pixels()[top : top + height, left : left + width]
     assert np.abs(seen.astype(int) - pixels[..., :3]).max() <= 1
+
+
+def test_whatever_was_drawn_before_is_not_seen(device: Device, tmp_path: Path) -> None:
+    """A canvas that draws one thing after the other, beside one that is made for each; thumbnails as well."""
+    dice, size = Random("canvas"), (160, 120)
+    write_picture(tmp_path / "pattern.png", pattern(120, 90))
+    frames = [shown_pixels(pattern(120, 90).with_pixels(pattern(120, 90).pixels // k), 400) for k in (1, 2, 3)]
+    recipe = Recipe(
+        fluid=FluidSettings(grid=24, viscosity=0.02),
+        duration=1.0,
+        stroke=(Stroke(tool="push", samples=((0, 0.3, 0.5, 1.0), (9, 0.6, 0.5, 1.0))),),
+        mask=(MaskStroke(kind="stroke", tool="freeze", radius=0.2, samples=((0, 0.8, 0.2, 1.0),)),),
+        force=(PointForce(kind="point", point=(0.2, 0.7), direction=(1.0, 0.0), radius=0.2, at=(0.2,)),),
+    )
+    project, state = from_picture(tmp_path / "pattern.png", recipe), EditorState()
+    session, pixels, palette = Session(device, project), frames[0], PALETTES["dark"]
+    view, scale = Viewport(Rect(10, 8, 140, 104), (120, 90)), 1.0
+    canvas, ground = Canvas(device, project), (0.3, 0.6, 0.9, 1.0)
+    targets = [device.ctx.framebuffer([device.ctx.texture(size, 4)]) for _ in range(2)]
+
+    def seen(by: Canvas, target: moderngl.Framebuffer) -> tuple[bytes, bytes]:
+        target.clear(*ground)
+        target.viewport = (0, 0, *size)
+        by.draw(target, size[1], view, session, state, palette, scale)
+        while by.is_unfinished:
+            by.draw(target, size[1], view, session, state, palette, scale)
+        assert target.viewport == (0, 0, *size)
+        by.thumbnails.take(1, session)
+        small = by.thumbnails.of(1)
+        assert small is not None
+        return target.read(components=4, alignment=1), small.read()
+
+    try:
+        for step in range(28):
+            middle = view.canvas.middle
+            match what := dice.choice(("view", "view", "view", "time", "frame", "state", "state", "edit", "selected")):
+                case "view":
+                    view = dice.choice((view.fitted(), *(view.zoomed(zoom, *middle) for zoom in (0.3, 0.6, 2.5, 7.0))))
+                    view = view.panned(dice.choice((0.0, 0.0, 30.5)), dice.choice((0.0, 0.0, -20.0, 400.0)))
+                    palette, scale = PALETTES[dice.choice(sorted(PALETTES))], dice.choice((1.0, 1.5))
+                case "time":
+                    session.seek(dice.choice((0, 4, 15, 30)))
+                    session.settle()
+                    session.pause()
+                case "frame":
+                    canvas.show(pixels := dice.choice(frames))
+                case "state":
+                    state.toggle_overlay(dice.choice(sorted(state.overlays)))
+                    state.overlays[dice.choice(sorted(state.overlays))].opacity = dice.choice((0.4, 0.9))
+                    state.split = dice.choice((None, None, 0.4, 0.7))
+                    state.before, state.is_scaling = dice.random() < 0.15, dice.random() < 0.3
+                    state.tool_name = dice.choice(("push", "select", "freeze", "thicken"))
+                case "edit":
+                    session.edit("Edges", edges=dice.choice(("transparent", "clamp")))
+                    session.settle()
+                case "selected":
+                    area = np.zeros((9, 12), np.uint8)
+                    area[dice.randint(0, 6) :, dice.randint(0, 9) :] = 255
+                    state.selected_area = dice.choice((area, None))
+            fresh = Canvas(device, project, pixels)
+            try:
+                found, wanted = seen(canvas, targets[0]), seen(fresh, targets[1])
+            finally:
+                fresh.release()
+            assert [one == other for one, other in zip(found, wanted, strict=True)] == [True, True], (step, what)
+            beside = np.frombuffer(found[0], np.uint8).reshape(size[1], size[0], 4).copy()
+            beside[8:112, 10:150] = np.round(np.multiply(ground, 255))
+            assert (beside == np.round(np.multiply(ground, 255))).all(), (step, what)
+    finally:
+        canvas.release()
+        session.release_gpu()
+        for target in targets:
+            target.color_attachments[0].release()
+            target.release()
 
 
 def test_a_picture_is_shown_with_all_its_pixels_and_what_is_larger_tells(

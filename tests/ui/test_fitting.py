@@ -196,6 +196,10 @@ def test_pairs_that_fall_on_the_window_are_fitted_as_by_the_command_line(robot: 
     process = robot.editor.fits.process
     assert process is not None
     assert process.fit.pairs is not None
+    assert not robot.editor.files.is_loading
+    assert [
+        message.text for message in messages.shown if "Cannot" in message.text
+    ] == []  # it is opened as nothing else
     np.testing.assert_allclose(process.fit.pairs.places, pairs.places, atol=1e-9)
     assert process.fit.recipe.duration == 1.0  # nothing has been done yet that has a time
     robot.frame(Drop((str(tmp_path / "p.pts"), str(tmp_path / "q.pts"))))

@@ -5,12 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from math import cos, sin
 from pathlib import Path
+from typing import Any
 from unittest.mock import Mock
 
 import moderngl
 import pytest
 
 from app.errors import UserError
+from app.model.recipe import Recipe
 from app.ui.rehearsal import PARTS, TICKS
 from app.work.replay import Replay
 from solver.gl import passes
@@ -55,6 +57,26 @@ def test_presses_interrupt_it_and_then_each_part_does_what_it_is_for_and_leaves_
     assert not robot.editor.wants_frame()
     assert (session.replay.steps, session.recipe, session.is_moving) == (steps, recipe, False)
     assert robot.device.watch is None
+
+
+PARTS_OF: dict[str, dict[str, Any]] = {
+    "handle": {"at": (0.4, 0.5), "to": (0.5, 0.5)},
+    "pin": {"at": (0.4, 0.5)},
+    "mask": {"kind": "fill", "tick": 0, "of": "frozen", "amount": 1.0},
+    "viscosity": {"kind": "constant", "scale": 0.05},
+    "freeze": {"kind": "constant", "window": {"box": (0.1, 0.1, 0.5, 0.5)}},
+    "force": {"kind": "vortex", "point": (0.5, 0.5), "strength": 0.1},
+}
+
+
+@pytest.mark.parametrize(
+    ("part", "wanted"),
+    [("", [0]), ("force", [0]), ("handle", [0, 1]), ("pin", [0, 1]), ("mask", [0, 2]), ("viscosity", [0, 2]),
+     ("freeze", [0, 2])],
+)  # fmt: skip
+def test_strokes_wait_for_what_their_recipe_needs_and_for_nothing_else(part: str, wanted: list[int]) -> None:
+    recipe = Recipe.model_validate({part: (PARTS_OF[part],)} if part else {})
+    assert [number for number, one in enumerate(PARTS) if one.is_for(recipe)] == wanted
 
 
 @pytest.mark.parametrize("error", [GraphicsMemoryError("no memory"), UserError("no memory")])
