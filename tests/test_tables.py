@@ -5,7 +5,6 @@ After a change that is meant: `FLUIDWARP_GOLDEN=write pytest tests/test_tables.p
 
 from __future__ import annotations
 
-import ast
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass
@@ -14,7 +13,6 @@ from inspect import signature
 from itertools import product
 from pathlib import Path
 from pkgutil import walk_packages
-from types import ModuleType
 from typing import Any
 
 from pydantic import BaseModel
@@ -31,7 +29,7 @@ from app.ui.preferences import Preferences
 from app.work.jobs import MapOutput, Outputs
 from support.golden import GOLDEN, WRITES
 
-FILE, DEFAULTS, CONSTANTS = (GOLDEN / name for name in ("tables.txt", "defaults.txt", "constants.txt"))
+FILE, DEFAULTS = GOLDEN / "tables.txt", GOLDEN / "defaults.txt"
 PLACES = re.compile(r" at 0x[0-9a-f]+")  # in memory
 
 
@@ -86,42 +84,13 @@ def rows() -> Iterator[str]:
                 yield f"{called}: {given}"
 
 
-NUMBERED = {"app.media.files.MENDS"}
-"""By the errors of the system, whose numbers differ."""
-ROOMS = app.model, app.media, app.work, app.ui
-
-
-def modules(*rooms: ModuleType) -> list[str]:
-    """Those of rooms, by name."""
-    return sorted(
-        one.name for room in rooms for one in walk_packages(room.__path__, f"{room.__name__}.") if not one.ispkg
-    )
-
-
-def is_plain(value: Any) -> bool:
-    """It is a number, or words, or holds nothing but these."""
-    if isinstance(value, (tuple, list, set, frozenset)):
-        return all(map(is_plain, value))
-    if isinstance(value, Mapping):
-        return all(is_plain(key) and is_plain(part) for key, part in value.items())
-    return type(value) in (bool, int, float, str, type(None))
-
-
-def constants() -> Iterator[str]:
-    """What the modules call by capitals, of numbers and words."""
-    for name in modules(*ROOMS, solver):
-        module = import_module(name)
-        for line in ast.parse(Path(module.__file__ or "").read_text("utf-8")).body:
-            targets = line.targets if isinstance(line, ast.Assign) else [getattr(line, "target", None)]
-            for target in (part for one in targets if one is not None for part in ast.walk(one)):
-                called = getattr(target, "id", "")
-                if called.isupper() and f"{name}.{called}" not in NUMBERED and is_plain(vars(module).get(called, ...)):
-                    yield f"{name}.{called}: {told(vars(module)[called])}"
-
-
 def offered() -> Iterator[tuple[str, Any]]:
     """What the modules of the rooms offer one another, with its methods."""
-    for name in modules(*ROOMS):
+    rooms = [app.model, app.media, app.work, app.ui]
+    names = sorted(
+        one.name for room in rooms for one in walk_packages(room.__path__, f"{room.__name__}.") if not one.ispkg
+    )
+    for name in names:
         for part, one in sorted(vars(import_module(name)).items()):
             if getattr(one, "__module__", "") == name and not part.startswith("_") and callable(one):
                 yield f"{name}.{part}", one
@@ -140,13 +109,6 @@ def test_what_need_not_be_given_is_as_it_is_written_down() -> None:
     if WRITES:
         DEFAULTS.write_text("\n".join(found) + "\n", "utf-8")
     assert found == DEFAULTS.read_text("utf-8").splitlines()
-
-
-def test_the_constants_are_as_they_are_written_down() -> None:
-    found = list(constants())
-    if WRITES:
-        CONSTANTS.write_text("\n".join(found) + "\n", "utf-8")
-    assert found == CONSTANTS.read_text("utf-8").splitlines()
 
 
 def test_the_tables_are_as_they_are_written_down() -> None:
