@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from copy import deepcopy
 from dataclasses import asdict, fields, is_dataclass, replace
 from datetime import datetime
-from fractions import Fraction
+from importlib import import_module
 from pathlib import Path, PurePath
 from types import SimpleNamespace
 from typing import Any
@@ -20,13 +20,11 @@ import pytest
 from imgui_bundle import imgui
 
 from app.errors import UserError
-from app.media.animation import animation_writer
-from app.media.clip import Clip
-from app.media.project import Project
-from app.model.forces import VortexForce
+from app.model.areas import Part
+from app.model.bars import Which
 from app.model.handles import RecipeHandle, RecipePin
 from app.model.recipe import Recipe
-from app.model.strokes import Stroke, ToolName
+from app.model.strokes import Stroke
 from app.model.undo import Entry
 from app.ui.actions import ACTIONS
 from app.ui.browser import Browser
@@ -35,7 +33,7 @@ from app.ui.events import Move
 from app.ui.export_choices import ANIMATION, MAP, PICTURE
 from app.ui.export_dialog import ExportDialog, StillExporting
 from app.ui.key_sheet import KeySheet
-from app.ui.recovery_dialog import Offer, Recovery
+from app.ui.recovery_dialog import Offer
 from app.ui.saving import SaveDialog
 from app.ui.viewport import Rect
 from app.work import playing, recording
@@ -43,7 +41,7 @@ from app.work.journal import Origin, Work
 from app.work.recovery import Found
 from solver.gl.device import Device
 from support.drawn import Drawn, new_in
-from support.editing import Robot, add_bars, export_dialog, pattern, small_project, summary
+from support.editing import Robot, add_bars, export_dialog, small_project, summary
 from support.golden import GOLDEN, WRITES
 from support.widgets import Widget, Widgets
 
@@ -52,6 +50,9 @@ SIZE = (1280, 2000)  # all of the inspector is seen
 LAID = ("rect", "entered", "_top", "_placed_for", "_highest", "_scrolls", "_is_settled", "_doubted_at")
 """Of a dialog, what tells where it lies and when something was pressed."""
 WORDS = ("add_text ", "text_unformatted ", "menu_item ", "begin_menu ", "input_text ")
+PANELS = "bar", "strip", "timebar", "inspector", "hud"
+KINDS = "slider", "check", "choice", "list", "section", "input_text_with_hint"
+"""Of panels; what their buttons do, `test_actions.py` tells."""
 MOST = 8  # changes that are written down of one press
 
 
@@ -66,6 +67,8 @@ def a_tick_a_frame(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture(scope="module")
 def golden() -> Iterator[dict[str, list[str]]]:
     """What was written down, by scene; or, where it is to be written anew, what is found."""
+    if not WRITES and FILE.read_text("utf-8").split("\n")[0] != imgui.get_version():
+        pytest.skip("widgets lie elsewhere in other versions of imgui")
     parts = {} if WRITES else dict(part.split("\n", 1) for part in FILE.read_text("utf-8").split("== ")[1:])
     scenes = {name: text.splitlines() for name, text in parts.items()}
     yield scenes
@@ -112,10 +115,17 @@ class Pressing:
         self.drawn = Drawn(monkeypatch, ("add_text",))
         self.widgets = Widgets(robot, monkeypatch)
         self.told: list[str] = []
+        self.panels = PANELS  # that are drawn: each takes its part of a frame
+        for name in PANELS:
+            self._draw_if_wanted(monkeypatch, name)
         self.done: set[tuple[str, ...]] = set()
         editor = robot.editor
         self.first = deepcopy(editor.preferences.__dict__), deepcopy(plain(editor.state)), editor.view
         self.work, self.at = editor.session.document.history.index, editor.session.target
+
+    def _draw_if_wanted(self, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+        draw = import_module(f"app.ui.panels.{name}").draw
+        monkeypatch.setattr(f"app.ui.panels.{name}.draw", lambda *given: draw(*given) if name in self.panels else None)
 
     def tell(self, what: str) -> Callable[..., None]:
         """Something to be called that notes what it is, and with what it is called."""
@@ -124,9 +134,11 @@ class Pressing:
     def state(self, asked: Dialog | None) -> dict[str, str]:
         """All that could have been changed."""
         editor = self.robot.editor
+        history = editor.session.document.history
         found: dict[str, Any] = summary(self.robot) | {
             "likes": asdict(editor.preferences),
-            "state": plain(editor.state) | {"overlays": editor.state.overlays, "lanes": plain(editor.state.lanes)},
+            "state": plain(editor.state) | {"overlays": editor.state.overlays},
+            "history": (history.index, history.entries[history.index].name),
             "recipe": editor.session.recipe.model_dump(exclude_defaults=True),
             "automatic": editor.session.is_grid_automatic,
             "dialog": plain(asked) if asked else {},
@@ -183,9 +195,9 @@ class Pressing:
             changes[MOST:] = [f"{len(changes) - MOST} more"] if len(changes) > MOST else []
             come, gone = (new_in(sorted(a.elements()), b) for a, b in ((now, read), (read, now)))
             rows = [f"{widget.kind} {widget.words}: {'; '.join(changes) or 'nothing'}"]
-            rows += [f"    + {' / '.join(come)}"] if 0 < len(come) < 3 * MOST else []
+            rows += [f"    + {' / '.join(come)}"] if 0 < len(come) <= MOST else []
             is_closed = asked is not None and asked not in robot.editor.dialogs.shown  # and so are all its words
-            rows += [f"    - {' / '.join(gone)}"] if 0 < len(gone) < 3 * MOST and not is_closed else []
+            rows += [f"    - {' / '.join(gone)}"] if 0 < len(gone) <= MOST and not is_closed else []
             lines += [row.replace(str(self.folder), "FOLDER").replace("\n", " ") for row in rows]
 
     def begin(self, scene: Callable[[], Dialog | None]) -> Dialog | None:
@@ -214,6 +226,14 @@ class Pressing:
         robot.frame(Move(5, 5), dt=1.0)  # so that no double click comes of two presses
         robot.frame(count=2)
         return asked
+
+
+def compared(name: str, found: list[str], golden: dict[str, list[str]]) -> list[str]:
+    """What of a scene is not as it is written down."""
+    if WRITES:
+        golden[name] = found
+    more, less = new_in(found, Counter(golden[name])), new_in(golden[name], Counter(found))
+    return [f"{name}: {line}" for line in (*more, *(f"not {line}" for line in less))]
 
 
 def _short(value: object) -> str:
@@ -262,10 +282,9 @@ def of_files(pressing: Pressing) -> Iterator[tuple[str, Callable[[], Dialog | No
     yield "unsaved", lambda: show(Unsaved(editor.workspace, "quit", tell("save"), tell("then")))
     yield "picture or map", lambda: show(PictureOrMap("a.exr", tell("picture"), tell("map")))
     yield "open", lambda: show(Browser("Open", inside, endings, take))
-    yield "open in an empty folder", lambda: show(Browser("Open", inside / "further", endings, take))
     yield "save a new file", lambda: show(Browser("Save the mask", inside, endings, take, "new.png"))
     yield "replace a file", lambda: show(Browser("Save the mask", inside, endings, take, "a.png"))
-    yield "save without a name", lambda: show(Browser("Save the mask", inside, endings, take, ""))
+    yield "save without a name", lambda: show(Browser("Save the mask", inside / "further", endings, take, ""))
 
     def with_row(name: str | None, row: int, take: Callable[[Path], None]) -> Dialog:
         dialog = show(Browser("Save" if name else "Open", inside, endings, take, name))
@@ -280,7 +299,7 @@ def of_files(pressing: Pressing) -> Iterator[tuple[str, Callable[[], Dialog | No
     yield "open what cannot be", lambda: with_row(None, 2, refuse)
     project = replace(editor.session.project, folder=Path("pictures"))
     (folder / "there.fluidwarp").write_bytes(b"")
-    for embed, name in ((True, "new"), (False, "new"), (True, "there")):
+    for embed, name in ((False, "new"), (True, "there")):
         likes, path = replace(editor.preferences, embed=embed), folder / f"{name}.fluidwarp"
         yield f"save {name}, {embed}", lambda likes=likes, path=path: show(
             SaveDialog(project, path, likes, editor.chooser, tell("written"), tell("then"))
@@ -388,12 +407,53 @@ def of_exports(pressing: Pressing) -> Iterator[tuple[str, Callable[[], Dialog | 
 TOURS = (of_files, of_the_window, of_exports)
 
 
+def of_panels(pressing: Pressing) -> Iterator[tuple[str, Callable[[], Dialog | None]]]:
+    """All sections of the inspector, the bar, the timeline and its bars."""
+    state, robot = pressing.robot.editor.state, pressing.robot
+
+    def take(tool: str, label: str = "", bars: tuple[Which, ...] = (), **more: Any) -> None:
+        state.sections = dict.fromkeys(SECTIONS if not bars else (), True)
+        state.sections |= {name: False for name in ("fluid", "view", "history", *SECTIONS) if name not in state.sections}
+        state.lanes.shown, state.lanes.selected = bool(bars), set(bars)
+        vars(state).update(more)
+        state.choose_tool(tool, False)
+        state.selected = label
+
+    pressing.panels = "bar", "timebar", "strip"
+    yield "the brush", lambda: take("push")
+    yield "the brush of thickness", lambda: take("thicken")
+    pressing.panels = ("inspector",)
+    yield "the inspector", lambda: take("push")
+    yield "thickness", lambda: take("thicken", symmetry="radial")
+    yield "a handle", lambda: take("handle", "handle[1]")
+    yield "a handle with keys", lambda: take("handle", "handle[2]")
+    yield "a line of goals", lambda: take("handle", "handle[3]")
+    yield "a pin", lambda: take("handle", "pin[1]")
+    yield "a selection by colour", lambda: take("select", select_by="colour", selection=SELECTED)
+    yield "nothing selected", lambda: take("select", mask="thickness")
+    for which in (("stroke", 0), ("stroke", 1), ("force", 0), ("force", 1), ("handle", 0), ("pin", 0)):
+        pressing.done -= {key for key in pressing.done if key[1] == "inspector" and key[0] == "slider"}
+        yield f"bars: {which}", lambda which=which: take("twirl", "", (which,))
+    yield "several bars", lambda: take("twirl", "", (("stroke", 0), ("stroke", 1)))
+
+    def more() -> None:
+        take("bloat")
+        robot.frame(count=2)
+        (button,) = (widget for widget in pressing.widgets.drawn if widget.words == "more")
+        robot.click(*button.rect.middle)
+
+    pressing.panels = ("bar",)
+    yield "more about the brush", more
+
+
+SECTIONS = ("fluid", "symmetry", "view", "quality", "masks", "handles", "selection")
+SELECTED = (Part(outline=((0.1, 0.1), (0.5, 0.1), (0.3, 0.6))),)
+
+
 @pytest.mark.parametrize("tour", TOURS, ids=lambda tour: tour.__name__)
 def test_what_is_pressed_in_a_dialog_does_what_is_written_down(
     device: Device, tmp_path: Path, tour: Any, golden: dict[str, list[str]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    if not WRITES and FILE.read_text("utf-8").split("\n")[0] != imgui.get_version():
-        pytest.skip("widgets lie elsewhere in other versions of imgui")
     told = []
     with Robot(device, small_project(tmp_path), (1280, 1000)) as robot:
         stroke = Stroke(tool="push", samples=((0, 0.3, 0.5, 1.0), (20, 0.4, 0.4, 1.0)))
@@ -401,16 +461,38 @@ def test_what_is_pressed_in_a_dialog_does_what_is_written_down(
         robot.editor.session.seek(30)
         pressing = Pressing(robot, monkeypatch, tmp_path)
         monkeypatch.setattr("app.ui.export_dialog.ExportProcess", Still)
-        for panel in ("bar", "strip", "timebar", "inspector", "hud"):  # which lie behind, and take most of a frame
-            monkeypatch.setattr(f"app.ui.panels.{panel}.draw", lambda *_: None)
+        pressing.panels = ()
         for name, scene in tour(pressing):
             if tour is not of_exports:
                 pressing.done.clear()
             found = pressing.all_of(scene, is_in_dialog)
-            name = f"{tour.__name__}: {name}"
-            if WRITES:
-                golden[name] = found
-            if found != golden[name]:
-                told += [f"{name}: {line}" for line in new_in(found, Counter(golden[name]))]
-                told += [f"{name}: not {line}" for line in new_in(golden[name], Counter(found))]
+            told += compared(f"{tour.__name__}: {name}", found, golden)
+    assert not told, "\n".join(told[:40])
+
+
+def test_what_is_pressed_in_a_panel_does_what_is_written_down(
+    device: Device, tmp_path: Path, golden: dict[str, list[str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told = []
+    with Robot(device, small_project(tmp_path), SIZE) as robot:
+        session = robot.editor.session
+        strokes = tuple(
+            Stroke(tool=tool, samples=((15 * k, 0.3, 0.5, 1.0), (15 * k + 12, 0.4, 0.4, 1.0)))
+            for k, tool in enumerate(("push", "twirl", "bloat"))
+        )
+        led = RecipeHandle(at=(0.4, 0.5), to=(0.5, 0.45), duration=0.1)
+        keyed = led.edited(at=(0.7, 0.6), turned=((0.5, 20.0, 1.1), (1.0, 40.0, 1.2)))
+        line = RecipeHandle(points=((0.2, 0.8), (0.5, 0.8)), at=(0.35, 0.8), goals=((0.2, 0.7), (0.5, 0.75)), duration=0.1)
+        parts = {"handle": (led, keyed, line), "pin": (RecipePin(at=(0.7, 0.3)),)}
+        session.edit("Work", stroke=strokes, duration=2.0, **parts)
+        add_bars(session)
+        session.seek(0)
+        robot.editor.state.lanes.shown = True
+        robot.frame(count=2)  # so that the lanes know the work
+        robot.editor.state.lanes.shown = False
+        pressing = Pressing(robot, monkeypatch, tmp_path)
+        monkeypatch.setattr(robot.editor, "do", pressing.tell("do"))
+        for name, scene in of_panels(pressing):
+            found = pressing.all_of(scene, lambda widget: widget.kind in KINDS and widget.words != "Statistics")
+            told += compared(name, found, golden)
     assert not told, "\n".join(told[:40])
