@@ -337,7 +337,7 @@ class Editor:
                 if down and self.dialogs.shown:
                     if key and not repeat:
                         self.dialogs.shown[-1].hear(mods.chord(key))
-                # Space is also held to pan, so that it acts only once it is let go; a list that is open has its own keys.
+                # Space is also held to pan, so that it acts only once it is let go; an open list has keys of its own.
                 elif down and key != "space" and not (self.ui.has_popup and key in IN_LISTS):
                     self._key(key, mods.chord(key), repeat)
                 if not self.dialogs.shown and not self.backend.is_typing:

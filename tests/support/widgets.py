@@ -76,7 +76,7 @@ class Widgets:
         self.look()
 
     def _note(self, monkeypatch: pytest.MonkeyPatch, owner: Any, kind: str, place: int | None) -> None:
-        """`place`: of the argument that is written on it, behind the first; None where it is not to be found by that."""
+        """`place`: of the argument that is written on it; None where that is the first, and it is not found by that."""
         drawn = getattr(owner, kind)
 
         def noting(*given: Any, **named: Any) -> Any:

@@ -1,7 +1,7 @@
-"""What comes of every widget that is pressed, in dialogs and panels, each for itself, as `golden/pressed.txt` has it: what
-is set by it, done and told, and which words come and go.
+"""What comes of each widget of dialogs and panels that is pressed, as `golden/pressed.txt` has it.
 
-After a change that is meant: `FLUIDWARP_GOLDEN=write pytest` of this file, and read the change.
+What is set by it, done and told, and which words come and go. After a change that is meant: `FLUIDWARP_GOLDEN=write
+pytest` of this file, and read the change.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from copy import deepcopy
 from dataclasses import asdict, fields, is_dataclass, replace
 from datetime import datetime
+from fractions import Fraction
 from importlib import import_module
 from pathlib import Path, PurePath
 from types import SimpleNamespace
@@ -20,6 +21,7 @@ import pytest
 from imgui_bundle import imgui
 
 from app.errors import UserError
+from app.media.animation import animation_writer
 from app.model.areas import Part
 from app.model.bars import Which
 from app.model.handles import RecipeHandle, RecipePin
@@ -41,7 +43,7 @@ from app.work.journal import Origin, Work
 from app.work.recovery import Found
 from solver.gl.device import Device
 from support.drawn import Drawn, new_in
-from support.editing import Robot, add_bars, export_dialog, small_project, summary
+from support.editing import Robot, add_bars, export_dialog, pattern, small_project, summary
 from support.golden import GOLDEN, WRITES
 from support.widgets import Widget, Widgets
 
@@ -51,17 +53,18 @@ LAID = ("rect", "entered", "_top", "_placed_for", "_highest", "_scrolls", "_is_s
 """Of a dialog, what tells where it lies and when something was pressed."""
 WORDS = ("add_text ", "text_unformatted ", "menu_item ", "begin_menu ", "input_text ")
 PANELS = "bar", "strip", "timebar", "inspector", "hud"
-KINDS = "slider", "check", "choice", "list", "section", "input_text_with_hint"
-"""Of panels; what their buttons do, `test_actions.py` tells."""
+KINDS = "key", "button", "icon_button", "slider", "check", "choice", "input_text", "selectable"
+IN_PANELS = "slider", "slider twice", "check", "choice", "list", "section", "input_text_with_hint"
+"""What their buttons do, `test_actions.py` tells."""
 MOST = 8  # changes that are written down of one press
 
 
 @pytest.fixture(autouse=True)
 def a_tick_a_frame(monkeypatch: pytest.MonkeyPatch) -> None:
-    """However fast the machine is."""
+    """However fast the machine is; and a step where the work is as it was again."""
     monkeypatch.setattr(playing, "QUICK", 0.0)
     monkeypatch.setattr(playing, "PATIENCE", 0.0)
-    monkeypatch.setattr(recording, "RETURN", 600.0)
+    monkeypatch.setattr(recording, "RETURN", 0.0)
 
 
 @pytest.fixture(scope="module")
@@ -115,10 +118,12 @@ class Pressing:
         self.drawn = Drawn(monkeypatch, ("add_text",))
         self.widgets = Widgets(robot, monkeypatch)
         self.told: list[str] = []
+        self.read = Counter[str]()  # when the scene before began
         self.panels = PANELS  # that are drawn: each takes its part of a frame
         for name in PANELS:
             self._draw_if_wanted(monkeypatch, name)
         self.done: set[tuple[str, ...]] = set()
+        self.kinds = KINDS
         editor = robot.editor
         self.first = deepcopy(editor.preferences.__dict__), deepcopy(plain(editor.state)), editor.view
         self.work, self.at = editor.session.document.history.index, editor.session.target
@@ -160,7 +165,9 @@ class Pressing:
             robot.key(widget.words)
         else:
             robot.click(*widget.rect.middle)
-        if widget.kind.startswith("input"):
+        if widget.kind == "slider twice":  # it is as by default then, and the history as before
+            robot.click(*widget.rect.middle)
+        elif widget.kind.startswith("input"):
             robot.key("ctrl+a")
             robot.type("x5")
             robot.frame(count=2)
@@ -176,18 +183,24 @@ class Pressing:
         before, read = dict[str, str](), Counter[str]()
         while True:
             asked = self.begin(scene)
+            if not before:
+                messages = [message.text for message in robot.editor.messages.shown]
+                told = f"begins: {'; '.join((*self.told, *messages))}"
+                before, read = self.state(asked), self.words()
+                come, self.read = new_in(sorted(read.elements()), self.read), read
+                lines += map(self.row, (told, f"    + {' / '.join(come)}"))
             count = Counter[tuple[str, ...]]()
             keys = [Widget("key", "###dialog", key, Rect(0, 0, 0, 0)) for key in ("enter", "escape") if asked]
-            for widget in (*keys, *self.widgets.drawn):
+            twice = [replace(each, kind="slider twice") for each in self.widgets.drawn if each.kind == "slider"]
+            for widget in (*keys, *self.widgets.drawn, *twice):
                 window = "dialog" if "###dialog" in widget.window else widget.window
                 which = widget.kind, window, widget.words
                 count[which] += 1
-                if is_of(widget) and (*which, str(count[which])) not in self.done:
+                if widget.kind in self.kinds and is_of(widget) and (*which, str(count[which])) not in self.done:
                     self.done.add((*which, str(count[which])))
                     break
             else:
                 return lines
-            before, read = (before, read) if before else (self.state(asked), self.words())
             self.press(widget)
             after, now = self.state(asked), self.words()
             changes = [f"{key} {value}" for key, value in after.items() if before.get(key) != value]
@@ -198,7 +211,10 @@ class Pressing:
             rows += [f"    + {' / '.join(come)}"] if 0 < len(come) <= MOST else []
             is_closed = asked is not None and asked not in robot.editor.dialogs.shown  # and so are all its words
             rows += [f"    - {' / '.join(gone)}"] if 0 < len(gone) <= MOST and not is_closed else []
-            lines += [row.replace(str(self.folder), "FOLDER").replace("\n", " ") for row in rows]
+            lines += map(self.row, rows)
+
+    def row(self, text: str) -> str:
+        return text.replace(str(self.folder), "FOLDER").replace("\n", " ")
 
     def begin(self, scene: Callable[[], Dialog | None]) -> Dialog | None:
         """Close what is open, and let the scene be as it was at first."""
@@ -221,10 +237,12 @@ class Pressing:
         if session.target != self.at:
             session.seek(self.at)
         session.settle()
-        asked = scene()
         self.told.clear()
+        asked = scene()
         robot.frame(Move(5, 5), dt=1.0)  # so that no double click comes of two presses
-        robot.frame(count=2)
+        robot.frame()
+        self.widgets.drawn.clear()
+        robot.frame()
         return asked
 
 
@@ -240,23 +258,30 @@ def _short(value: object) -> str:
     return f"<{type(value).__name__}>" if hasattr(value, "__dict__") and not isinstance(value, Path) else str(value)
 
 
-def is_in_dialog(widget: Widget) -> bool:
-    return "###dialog" in widget.window
+def is_over_all(widget: Widget) -> bool:
+    return "###dialog" in widget.window or widget.window == "exporting"
 
 
 def _of_job(job: Any) -> dict[str, Any]:
     """What an export has been asked for, but for where it goes."""
     recipe = job.recipe.model_dump(include={"output", "time", "duration", "fluid"}, exclude_defaults=True)
-    return {"outputs": job.outputs, "recipe": recipe, "frame": job.frame, "is of a clip": job.clip is not None}
+    return {
+        "outputs": job.outputs,
+        "recipe": recipe,
+        "has a frame": job.frame is not None,
+        "is of a clip": job.clip is not None,
+    }
 
 
 class Still:
     """A process that is at work, and gets no further."""
 
-    part, state, is_done, notices, error = 0.3, "frame 3 of 9", False, (), ""
+    part, state, is_done, notices, error, outcome = 0.3, "", False, (), "", SimpleNamespace(verdict=None)
+    last: Still
 
     def __init__(self, job: Any) -> None:
         self.job = job
+        Still.last = self
 
     def poll(self) -> None: ...
     def stop(self, then: Callable[[], None]) -> None:
@@ -301,12 +326,18 @@ def of_files(pressing: Pressing) -> Iterator[tuple[str, Callable[[], Dialog | No
     (folder / "there.fluidwarp").write_bytes(b"")
     for embed, name in ((False, "new"), (True, "there")):
         likes, path = replace(editor.preferences, embed=embed), folder / f"{name}.fluidwarp"
-        yield f"save {name}, {embed}", lambda likes=likes, path=path: show(
-            SaveDialog(project, path, likes, editor.chooser, tell("written"), tell("then"))
+        yield (
+            f"save {name}, {embed}",
+            lambda likes=likes, path=path: show(
+                SaveDialog(project, path, likes, editor.chooser, tell("written"), tell("then"))
+            ),
         )
     alone = replace(project, keeper=Path("a.fluidwarp"))
-    yield "save what is only in a project", lambda: show(
-        SaveDialog(alone, folder / "new.fluidwarp", editor.preferences, editor.chooser, tell("written"), None)
+    yield (
+        "save what is only in a project",
+        lambda: show(
+            SaveDialog(alone, folder / "new.fluidwarp", editor.preferences, editor.chooser, tell("written"), None)
+        ),
     )
 
 
@@ -369,7 +400,9 @@ def of_the_window(pressing: Pressing) -> Iterator[tuple[str, Callable[[], Dialog
         for running, well in ((True, False), (False, True), (False, False)):
             exports: Any = SimpleNamespace(is_running=True, went_well=False, name="a.mp4", part=0.3)
 
-            def leaving(exports: Any = exports, waits: bool = waits, running: bool = running, well: bool = well) -> Dialog:
+            def leaving(
+                exports: Any = exports, waits: bool = waits, running: bool = running, well: bool = well
+            ) -> Dialog:
                 exports.is_running, exports.went_well = True, False
                 dialog = show(StillExporting(exports, tell("leave")))
                 pressing.robot.frame(count=2)
@@ -404,7 +437,62 @@ def of_exports(pressing: Pressing) -> Iterator[tuple[str, Callable[[], Dialog | 
     yield "without a name", lambda: ask(PICTURE, 0, name=" ")
 
 
-TOURS = (of_files, of_the_window, of_exports)
+def of_a_clip(pressing: Pressing) -> Iterator[tuple[str, Callable[[], Dialog | None]]]:
+    """Its export."""
+    editor, folder = pressing.robot.editor, pressing.folder
+    with animation_writer(folder / "clip.apng", Fraction(5)) as write:
+        for _ in range(6):
+            write(pattern(96, 64).pixels)
+    pressing.robot.drop(folder / "clip.apng")
+    assert editor.session.project.clip is not None
+    pressing.work, pressing.at, pressing.kinds = 0, editor.session.target, ("slider", "check")
+
+    def ask() -> Dialog:
+        dialog = export_dialog(pressing.robot, folder)
+        dialog.choices.kind, dialog.name = ANIMATION, "a"
+        editor.dialogs.show(dialog)
+        return dialog
+
+    yield "a clip", ask
+
+
+def of_work(pressing: Pressing) -> Iterator[tuple[str, Callable[[], Dialog | None]]]:
+    """An export under way, or a picture on its way to the clipboard, and what is told of how it went."""
+    editor, tell = pressing.robot.editor, pressing.tell
+
+    def export(**becomes: Any) -> None:
+        job: Any = SimpleNamespace(target=Path("somewhere/a.png"), check=lambda: None)
+        editor.exports.start(job)
+        vars(Still.last).update(becomes)
+
+    def copy(given: str | None = None, **becomes: Any) -> None:
+        editor.session.seek(20)
+        editor.exports.copy(editor.session)
+        tell("copied")(*(f"{name} {value}" for name, value in leaves(_of_job(Still.last.job)) if "file" not in name))
+        vars(Still.last).update(becomes)
+        Given.is_done, Given.error = given is not None, given or ""
+
+    verdict = SimpleNamespace(verdict="the fluid is at rest at 1.5 s")
+    yield "an export", export
+    yield "an export that says what it does", lambda: export(state="writing")
+    yield "an export that went well", lambda: export(is_done=True, notices=("a loss", "another"))
+    yield "an export that a stop ended", lambda: export(is_done=True, outcome=verdict)
+    yield "an export that failed", lambda: export(is_done=True, error="Cannot write a.png: there is no room.")
+    yield "a copy", copy
+    yield "a copy on its way", lambda: copy(is_done=True)
+    yield "a copy that is there", lambda: copy("", is_done=True)
+    yield "a copy that failed", lambda: copy("There is no way.", is_done=True)
+
+
+class Given:
+    """A picture that is on its way to the clipboard, or is there, or cannot be."""
+
+    is_done, error = False, ""
+
+    def __init__(self, path: Path) -> None: ...
+
+
+TOURS = (of_work, of_a_clip, of_files, of_the_window, of_exports)
 
 
 def of_panels(pressing: Pressing) -> Iterator[tuple[str, Callable[[], Dialog | None]]]:
@@ -412,8 +500,7 @@ def of_panels(pressing: Pressing) -> Iterator[tuple[str, Callable[[], Dialog | N
     state, robot = pressing.robot.editor.state, pressing.robot
 
     def take(tool: str, label: str = "", bars: tuple[Which, ...] = (), **more: Any) -> None:
-        state.sections = dict.fromkeys(SECTIONS if not bars else (), True)
-        state.sections |= {name: False for name in ("fluid", "view", "history", *SECTIONS) if name not in state.sections}
+        state.sections = dict.fromkeys(SECTIONS, not bars) | {"history": False}
         state.lanes.shown, state.lanes.selected = bool(bars), set(bars)
         vars(state).update(more)
         state.choose_tool(tool, False)
@@ -456,16 +543,19 @@ def test_what_is_pressed_in_a_dialog_does_what_is_written_down(
 ) -> None:
     told = []
     with Robot(device, small_project(tmp_path), (1280, 1000)) as robot:
-        stroke = Stroke(tool="push", samples=((0, 0.3, 0.5, 1.0), (20, 0.4, 0.4, 1.0)))
-        robot.editor.session.edit("Push", stroke=(stroke,), duration=2.0)
-        robot.editor.session.seek(30)
+        if tour is not of_a_clip:  # before which it would be asked whether that is to be saved
+            stroke = Stroke(tool="push", samples=((0, 0.3, 0.5, 1.0), (20, 0.4, 0.4, 1.0)))
+            robot.editor.session.edit("Push", stroke=(stroke,), duration=2.0)
+            robot.editor.session.seek(30)
         pressing = Pressing(robot, monkeypatch, tmp_path)
         monkeypatch.setattr("app.ui.export_dialog.ExportProcess", Still)
+        monkeypatch.setattr("app.ui.export_dialog.Giving", Given)
+        monkeypatch.setattr("app.ui.export_dialog.check", lambda: None)
         pressing.panels = ()
         for name, scene in tour(pressing):
             if tour is not of_exports:
                 pressing.done.clear()
-            found = pressing.all_of(scene, is_in_dialog)
+            found = pressing.all_of(scene, is_over_all)
             told += compared(f"{tour.__name__}: {name}", found, golden)
     assert not told, "\n".join(told[:40])
 
@@ -482,7 +572,8 @@ def test_what_is_pressed_in_a_panel_does_what_is_written_down(
         )
         led = RecipeHandle(at=(0.4, 0.5), to=(0.5, 0.45), duration=0.1)
         keyed = led.edited(at=(0.7, 0.6), turned=((0.5, 20.0, 1.1), (1.0, 40.0, 1.2)))
-        line = RecipeHandle(points=((0.2, 0.8), (0.5, 0.8)), at=(0.35, 0.8), goals=((0.2, 0.7), (0.5, 0.75)), duration=0.1)
+        ends, goals = ((0.2, 0.8), (0.5, 0.8)), ((0.2, 0.7), (0.5, 0.75))
+        line = RecipeHandle(points=ends, at=(0.35, 0.8), goals=goals, duration=0.1)
         parts = {"handle": (led, keyed, line), "pin": (RecipePin(at=(0.7, 0.3)),)}
         session.edit("Work", stroke=strokes, duration=2.0, **parts)
         add_bars(session)
@@ -492,7 +583,8 @@ def test_what_is_pressed_in_a_panel_does_what_is_written_down(
         robot.editor.state.lanes.shown = False
         pressing = Pressing(robot, monkeypatch, tmp_path)
         monkeypatch.setattr(robot.editor, "do", pressing.tell("do"))
+        pressing.kinds = IN_PANELS
         for name, scene in of_panels(pressing):
-            found = pressing.all_of(scene, lambda widget: widget.kind in KINDS and widget.words != "Statistics")
+            found = pressing.all_of(scene, lambda widget: widget.words != "Statistics")
             told += compared(name, found, golden)
     assert not told, "\n".join(told[:40])
