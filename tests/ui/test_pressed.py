@@ -265,12 +265,8 @@ def is_over_all(widget: Widget) -> bool:
 def _of_job(job: Any) -> dict[str, Any]:
     """What an export has been asked for, but for where it goes."""
     recipe = job.recipe.model_dump(include={"output", "time", "duration", "fluid"}, exclude_defaults=True)
-    return {
-        "outputs": job.outputs,
-        "recipe": recipe,
-        "has a frame": job.frame is not None,
-        "is of a clip": job.clip is not None,
-    }
+    clip = {"frame": job.frame is not None, "all": job.clip is not None}
+    return {"outputs": job.outputs, "recipe": recipe, "clip": clip}
 
 
 class Still:
