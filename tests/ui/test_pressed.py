@@ -175,7 +175,7 @@ class Pressing:
         elif widget.kind == "list":
             robot.key("down")
             robot.key("enter")
-        robot.frame(dt=1.0, count=2)  # so that what it is comes to the pointer
+        robot.frame(dt=1.0)  # so that what it is comes to the pointer
 
     def all_of(self, scene: Callable[[], Dialog | None], is_of: Callable[[Widget], bool]) -> list[str]:
         """What comes of each widget of a scene that has not been pressed yet."""
@@ -508,13 +508,9 @@ def of_panels(pressing: Pressing) -> Iterator[tuple[str, Callable[[], Dialog | N
     pressing.panels = ("inspector",)
     yield "the inspector", lambda: take("push")
     yield "thickness", lambda: take("thicken", symmetry="radial")
-    yield "a handle", lambda: take("handle", "handle[1]")
-    yield "a handle with keys", lambda: take("handle", "handle[2]")
-    yield "a line of goals", lambda: take("handle", "handle[3]")
-    yield "a pin", lambda: take("handle", "pin[1]")
     yield "a selection by colour", lambda: take("select", select_by="colour", selection=SELECTED)
     yield "nothing selected", lambda: take("select", mask="thickness")
-    for which in (("stroke", 0), ("stroke", 1), ("force", 0), ("force", 1), ("handle", 0), ("pin", 0)):
+    for which in (("stroke", 0), ("stroke", 1), ("force", 0), ("force", 1)):
         pressing.done -= {key for key in pressing.done if key[1] == "inspector" and key[0] == "slider"}
         yield f"bars: {which}", lambda which=which: take("twirl", "", (which,))
     yield "several bars", lambda: take("twirl", "", (("stroke", 0), ("stroke", 1)))
@@ -527,6 +523,23 @@ def of_panels(pressing: Pressing) -> Iterator[tuple[str, Callable[[], Dialog | N
 
     pressing.panels = ("bar",)
     yield "more about the brush", more
+
+    session = robot.editor.session
+    session.go_to(pressing.work)
+    led = RecipeHandle(at=(0.4, 0.5), to=(0.5, 0.45), duration=0.1)
+    keyed = led.edited(at=(0.7, 0.6), turned=((0.5, 20.0, 1.1), (1.0, 40.0, 1.2)))
+    ends, goals = ((0.2, 0.8), (0.5, 0.8)), ((0.2, 0.7), (0.5, 0.75))
+    line = RecipeHandle(points=ends, at=(0.35, 0.8), goals=goals, duration=0.1)
+    session.edit("Handles", handle=(led, keyed, line), pin=(RecipePin(at=(0.7, 0.3)),))
+    session.seek(0)
+    pressing.work, pressing.panels = session.document.history.index, ("inspector",)
+    yield "a handle", lambda: take("handle", "handle[1]")
+    yield "a handle with keys", lambda: take("handle", "handle[2]")
+    yield "a line of goals", lambda: take("handle", "handle[3]")
+    yield "a pin", lambda: take("handle", "pin[1]")
+    for which in (("handle", 0), ("pin", 0)):
+        pressing.done -= {key for key in pressing.done if key[1] == "inspector" and key[0] == "slider"}
+        yield f"bars: {which}", lambda which=which: take("twirl", "", (which,))
 
 
 SECTIONS = ("fluid", "symmetry", "view", "quality", "masks", "handles", "selection")
@@ -566,12 +579,7 @@ def test_what_is_pressed_in_a_panel_does_what_is_written_down(
             Stroke(tool=tool, samples=((15 * k, 0.3, 0.5, 1.0), (15 * k + 12, 0.4, 0.4, 1.0)))
             for k, tool in enumerate(("push", "twirl", "bloat"))
         )
-        led = RecipeHandle(at=(0.4, 0.5), to=(0.5, 0.45), duration=0.1)
-        keyed = led.edited(at=(0.7, 0.6), turned=((0.5, 20.0, 1.1), (1.0, 40.0, 1.2)))
-        ends, goals = ((0.2, 0.8), (0.5, 0.8)), ((0.2, 0.7), (0.5, 0.75))
-        line = RecipeHandle(points=ends, at=(0.35, 0.8), goals=goals, duration=0.1)
-        parts = {"handle": (led, keyed, line), "pin": (RecipePin(at=(0.7, 0.3)),)}
-        session.edit("Work", stroke=strokes, duration=2.0, **parts)
+        session.edit("Work", stroke=strokes, duration=2.0)
         add_bars(session)
         session.seek(0)
         robot.editor.state.lanes.shown = True
