@@ -52,6 +52,7 @@ from app.work.session import Session
 from solver.gl.device import Device
 from solver.gl.field import GraphicsMemoryError
 
+IN_LISTS = ("enter", "up", "down", "left", "right")  # keys that go through a list or a menu, and choose in it
 AWAITING = 0.02  # seconds between two looks at whether a frame of a clip has been decoded
 TOLD = 2  # frames after a click or a key that may begin or end typing, in which imgui tells whether text is typed
 
@@ -336,7 +337,8 @@ class Editor:
                 if down and self.dialogs.shown:
                     if key and not repeat:
                         self.dialogs.shown[-1].hear(mods.chord(key))
-                elif down and key != "space":  # which is also held to pan, so that it acts only once it is let go
+                # Space is also held to pan, so that it acts only once it is let go; an open list has keys of its own.
+                elif down and key != "space" and not (self.ui.has_popup and key in IN_LISTS):
                     self._key(key, mods.chord(key), repeat)
                 if not self.dialogs.shown and not self.backend.is_typing:
                     self.pointer.handle(event)

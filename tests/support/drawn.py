@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from collections.abc import Sequence
 from typing import Any
 
 import pytest
@@ -24,11 +25,12 @@ class Drawn:
 
     Args:
         monkeypatch: of the test, at whose end nothing is noted any more.
+        shapes: those that are noted; each that is costs time.
     """
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, shapes: Sequence[str] = SHAPES) -> None:
         self.lines: list[str] = []
-        for name in SHAPES:
+        for name in shapes:
             self._note_shape(monkeypatch, name)
         for name in ("menu_item", "combo", "begin_menu", "text_unformatted", "input_text"):
             self._note_words(monkeypatch, name)

@@ -97,10 +97,9 @@ def messages(dice: Random) -> Iterator[Any]:
         match dice.choice(("say", "warn", "caution", "done", "see", "time", "time", "gone")):
             case "say":
                 shown.say(text)
-            case "warn":
-                shown.warn(text, lambda holding=holding: holding[0])
-            case "caution":
-                shown.caution(text, lambda holding=holding: holding[0])
+            case "warn" | "caution" as kind:
+                until = [lambda holding=holding: holding[0]] * dice.randint(0, 1)  # by default they always hold
+                getattr(shown, kind)(text, *until)
             case "done":
                 shown.done(text)
             case "see":

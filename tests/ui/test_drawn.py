@@ -56,6 +56,7 @@ def tools_and_marks(robot: Robot) -> Iterator[str]:
     yield "overlays, a split, sectors and the ring"
     state.symmetry, state.split, state.stabiliser = "both", None, 40.0
     robot.move(*robot.at(0.6, 0.6))
+    yield "a string that pulls nothing yet"
     robot.press()
     for step in range(20):
         robot.move(*robot.at(0.6 + 0.01 * step, 0.6 - 0.02 * step))
@@ -159,6 +160,13 @@ def time(robot: Robot) -> Iterator[str]:
     session.repeat(loops=False, returns=True)
     session.preview(amount=0.5)
     yield "there and back, half of it"
+    session.commit("Amount")
+    brief = [Stroke(tool="push", samples=((tick, 0.3, 0.5, 1.0),), repeat=9, every=2) for tick in (0, 400)]
+    hit = PointForce(kind="point", point=(0.2, 0.7), direction=(1.0, 0.0), radius=0.1, at=(0.2,))
+    session.edit("Brief", stroke=tuple(brief), force=(hit,), duration=90.0)
+    state.lanes.view = None
+    robot.frame(count=2)
+    yield "bars that are as narrow as can be"
 
 
 def dialogs(robot: Robot) -> Iterator[str]:
@@ -179,6 +187,10 @@ def dialogs(robot: Robot) -> Iterator[str]:
     editor.messages.warn("Cannot read a.png: it is no picture, or damaged; get it again.")
     robot.frame(count=2)
     yield "messages"
+    before, robot.size = robot.size, (1600, 720)
+    robot.frame(count=2)
+    yield "messages beside what is under way"
+    robot.size = before
     editor.messages.shown.clear()
     robot.key("ctrl+e")
     asked = editor.dialogs.shown[-1]
@@ -244,6 +256,13 @@ def panels(robot: Robot) -> Iterator[str]:
     editor.preferences.scale, editor.preferences.names = 1.0, True
     robot.frame(count=2)
     yield "names beside the tools"
+    robot.key("tab")
+    robot.frame(count=2)
+    yield "without the inspector"
+    robot.key("tab")
+    for tool in ("pan", "zoom", "freeze", "handle"):
+        state.choose_tool(tool, False)
+        yield f"{tool} in hand"
     robot.size = (600, 400)
     robot.frame(count=2)
     yield "a small window"

@@ -217,6 +217,7 @@ def work(robot: Robot, places: object) -> Iterator[str]:
         "Handle 1 is 69.5 pixels from where it should be: the picture around it cannot bend further."
     )
     yield "a message as well"
+    assert (editor.exports.is_running, editor.fits.is_running) == (True, True)  # also where there is no room for both
     editor.fits.give_up()
     editor.session.seek(0)
     editor.session.replay.seek(0)

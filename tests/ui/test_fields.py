@@ -35,6 +35,7 @@ from app.work.export import run
 from app.work.jobs import Job
 from solver.gl.device import Device
 from support.commands import Run
+from support.drawn import Drawn
 from support.editing import Robot, export_dialog, small_project
 from support.widgets import Widgets
 
@@ -108,7 +109,7 @@ def test_the_middle_of_the_viscosity_is_that_of_its_decades(robot: Robot, widget
 
 
 def test_a_map_that_work_starts_from_is_told_and_left_whatever_has_been_painted(
-    robot: Robot, widgets: Widgets, tmp_path: Path
+    robot: Robot, widgets: Widgets, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     np.save(tmp_path / "m.npy", np.full((180, 240, 2), 0.01, np.float32))
     robot.editor.files.start_from_map(tmp_path / "m.npy")
@@ -116,6 +117,9 @@ def test_a_map_that_work_starts_from_is_told_and_left_whatever_has_been_painted(
     robot.drag((0.4, 0.5), (0.5, 0.5), steps=3)
     robot.rest()
     only(robot, "quality")
+    drawn = Drawn(monkeypatch)
+    robot.frame()
+    assert any(line.endswith("| Starts from the map m.npy") for line in drawn.take())
     widgets.click("Start from the picture")
     assert robot.editor.session.recipe.map is None
     assert robot.editor.session.recipe.stroke
