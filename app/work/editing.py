@@ -188,9 +188,14 @@ class Editing(Painting):
         return name
 
     def retract(self) -> None:
-        """Take back what was committed last, unless it had changed nothing: Undo would take what was done before it."""
+        """Take back what was committed last, unless it had changed nothing: Undo would take what was done before it.
+
+        The playhead stays where it is: the hand goes on with what it has begun there.
+        """
         if self._has_committed:
+            tick = self.target
             self.undo()
+            self.seek(tick)
 
     def redo(self) -> str | None:
         """Make an edit again that was taken back; its name."""
