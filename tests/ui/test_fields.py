@@ -837,7 +837,8 @@ def test_a_double_click_on_a_slider_leaves_the_playhead_where_it_is(robot: Robot
 def test_a_key_that_chooses_in_an_open_list_does_nothing_else(robot: Robot, widgets: Widgets) -> None:
     """Enter fills the selection, but not where it takes a row."""
     state = robot.editor.state
-    only(robot, "symmetry")
+    only(robot)
+    state.sections["symmetry"] = True
     state.choose_tool("select", False)
     robot.drag((0.3, 0.3), (0.6, 0.6))
     assert state.selection
