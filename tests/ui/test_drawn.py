@@ -189,7 +189,7 @@ def dialogs(robot: Robot) -> Iterator[str]:
     editor.messages.warn("Cannot read a.png: it is no picture, or damaged; get it again.")
     robot.frame(count=2)
     yield "messages"
-    before, robot.size = robot.size, (1600, 720)
+    before, robot.size = robot.size, (1300, 720)
     robot.frame(count=2)
     yield "messages beside what is under way"
     robot.size = before

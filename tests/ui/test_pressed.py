@@ -201,6 +201,7 @@ class Pressing:
                     break
             else:
                 return lines
+            top = asked.rect.y if asked else 0.0
             self.press(widget)
             after, now = self.state(asked), self.words()
             changes = [f"{key} {value}" for key, value in after.items() if before.get(key) != value]
@@ -211,6 +212,7 @@ class Pressing:
             rows += [f"    + {' / '.join(come)}"] if 0 < len(come) <= MOST else []
             is_closed = asked is not None and asked not in robot.editor.dialogs.shown  # and so are all its words
             rows += [f"    - {' / '.join(gone)}"] if 0 < len(gone) <= MOST and not is_closed else []
+            rows += ["    its head moves"] if asked and not is_closed and abs(asked.rect.y - top) > 1 else []
             lines += map(self.row, rows)
 
     def row(self, text: str) -> str:
