@@ -119,11 +119,11 @@ class Pressing:
         self.widgets = Widgets(robot, monkeypatch)
         self.told: list[str] = []
         self.read = Counter[str]()  # when the scene before began
-        self.panels = PANELS  # that are drawn: each takes its part of a frame
+        self.panels: tuple[str, ...] = PANELS  # that are drawn: each takes its part of a frame
         for name in PANELS:
             self._draw_if_wanted(monkeypatch, name)
         self.done: set[tuple[str, ...]] = set()
-        self.kinds = KINDS
+        self.kinds: tuple[str, ...] = KINDS
         editor = robot.editor
         self.first = deepcopy(editor.preferences.__dict__), deepcopy(plain(editor.state)), editor.view
         self.work, self.at = editor.session.document.history.index, editor.session.target
@@ -512,7 +512,8 @@ def of_panels(pressing: Pressing) -> Iterator[tuple[str, Callable[[], Dialog | N
     yield "thickness", lambda: take("thicken", symmetry="radial")
     yield "a selection by colour", lambda: take("select", select_by="colour", selection=SELECTED)
     yield "nothing selected", lambda: take("select", mask="thickness")
-    for which in (("stroke", 0), ("stroke", 1), ("force", 0), ("force", 1)):
+    those: tuple[Which, ...] = ("stroke", 0), ("stroke", 1), ("force", 0), ("force", 1)
+    for which in those:
         pressing.done -= {key for key in pressing.done if key[1] == "inspector" and key[0] == "slider"}
         yield f"bars: {which}", lambda which=which: take("twirl", "", (which,))
     yield "several bars", lambda: take("twirl", "", (("stroke", 0), ("stroke", 1)))
@@ -539,7 +540,8 @@ def of_panels(pressing: Pressing) -> Iterator[tuple[str, Callable[[], Dialog | N
     yield "a handle with keys", lambda: take("handle", "handle[2]")
     yield "a line of goals", lambda: take("handle", "handle[3]")
     yield "a pin", lambda: take("handle", "pin[1]")
-    for which in (("handle", 0), ("pin", 0)):
+    those = ("handle", 0), ("pin", 0)
+    for which in those:
         pressing.done -= {key for key in pressing.done if key[1] == "inspector" and key[0] == "slider"}
         yield f"bars: {which}", lambda which=which: take("twirl", "", (which,))
 
