@@ -187,11 +187,6 @@ class Editing(Painting):
             self._show(self.document.history.undo())
         return name
 
-    def retract(self) -> None:
-        """Take back what was committed last, unless it had changed nothing: Undo would take what was done before it."""
-        if self._has_committed:
-            self.undo()
-
     def redo(self) -> str | None:
         """Make an edit again that was taken back; its name."""
         self.release()

@@ -145,6 +145,16 @@ class Playing(Editing):
         elif self.end:
             self._record()
 
+    def retract(self) -> None:
+        """Take back what was committed last, unless it had changed nothing: Undo would take what was done before it.
+
+        The playhead stays where it is: the hand goes on with what it has begun there.
+        """
+        if self._has_committed:
+            tick = self.target
+            self.undo()
+            self.seek(tick)
+
     def seek(self, tick: int) -> None:
         """Send the playhead to a tick of the recording; it arrives over the next frames."""
         self.release()

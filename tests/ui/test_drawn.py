@@ -32,9 +32,9 @@ from solver.gl.device import Device
 from support.drawn import Drawn, differences, new_in
 from support.editing import Robot, add_bars, small_project, summary
 from support.golden import GOLDEN, WRITES
+from support.widgets import Widgets
 
 FILE = GOLDEN / "drawn.txt"
-MORE = 650  # points across, of the button for more of the brush
 HIGH = (1100, 1500)  # all of the inspector is seen
 
 
@@ -176,8 +176,10 @@ def dialogs(robot: Robot) -> Iterator[str]:
     robot.rest()
     editor.preferences.presets["My own"] = {"radius": 0.05, "hardness": 1.0, "strength": 0.5}
     editor.preferences.recent = ["/somewhere/a.png", "/elsewhere/b.fluidwarp"]
-    for name, x in (("menu", 24), ("more of the brush", MORE)):
-        robot.click(x, 24)
+    with pytest.MonkeyPatch.context() as noting:
+        places = {widget.words: widget.rect.middle for widget in Widgets(robot, noting).drawn}
+    for name, button in (("menu", "menu"), ("more of the brush", "more")):
+        robot.click(*places[button])
         robot.frame(count=2)
         yield name
         robot.key("escape")
@@ -187,7 +189,7 @@ def dialogs(robot: Robot) -> Iterator[str]:
     editor.messages.warn("Cannot read a.png: it is no picture, or damaged; get it again.")
     robot.frame(count=2)
     yield "messages"
-    before, robot.size = robot.size, (1600, 720)
+    before, robot.size = robot.size, (1300, 720)
     robot.frame(count=2)
     yield "messages beside what is under way"
     robot.size = before

@@ -21,7 +21,7 @@ from app.media.project import from_picture
 from app.model.picture import Picture
 from app.model.presets import PUTTY
 from app.model.recipe import Output
-from app.model.strokes import BrushPath, Change
+from app.model.strokes import BrushPath, Change, Stroke
 from app.progress import Progress
 from app.ui.editor_state import EditorState
 from app.ui.events import LEFT, Button, Move
@@ -815,3 +815,32 @@ def test_every_slider_goes_as_far_as_it_did_and_back_to_its_default(
         dialog.take(preset)
         robot.frame(count=2)
     assert found == SLIDERS.strip().splitlines()
+
+
+@pytest.mark.parametrize("at", [0, 12])
+def test_a_double_click_on_a_slider_leaves_the_playhead_where_it_is(robot: Robot, widgets: Widgets, at: int) -> None:
+    """What its first click had done is taken back, which Undo would do with the playhead at the end."""
+    session = robot.editor.session
+    stroke = Stroke(tool="push", samples=((0, 0.3, 0.5, 1.0), (20, 0.4, 0.4, 1.0)))
+    session.edit("Push", stroke=(stroke,), duration=1.0)
+    session.seek(at)
+    session.settle()
+    before = session.document.history.index
+    widgets.look()
+    for _ in range(2):
+        robot.click(*widgets.at["Amount"].middle)
+    robot.frame(count=2)
+    session.settle()
+    assert (session.target, session.recipe.amount, session.document.history.index) == (at, 1.0, before)
+
+
+def test_a_key_that_chooses_in_an_open_list_does_nothing_else(robot: Robot, widgets: Widgets) -> None:
+    """Enter fills the selection, but not where it takes a row."""
+    state = robot.editor.state
+    only(robot)
+    state.sections["symmetry"] = True
+    state.choose_tool("select", False)
+    robot.drag((0.3, 0.3), (0.6, 0.6))
+    assert state.selection
+    widgets.choose("##symmetry", "Radial")
+    assert (state.symmetry, robot.editor.session.recipe.mask) == ("radial", ())

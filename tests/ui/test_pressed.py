@@ -119,11 +119,11 @@ class Pressing:
         self.widgets = Widgets(robot, monkeypatch)
         self.told: list[str] = []
         self.read = Counter[str]()  # when the scene before began
-        self.panels = PANELS  # that are drawn: each takes its part of a frame
+        self.panels: tuple[str, ...] = PANELS  # that are drawn: each takes its part of a frame
         for name in PANELS:
             self._draw_if_wanted(monkeypatch, name)
         self.done: set[tuple[str, ...]] = set()
-        self.kinds = KINDS
+        self.kinds: tuple[str, ...] = KINDS
         editor = robot.editor
         self.first = deepcopy(editor.preferences.__dict__), deepcopy(plain(editor.state)), editor.view
         self.work, self.at = editor.session.document.history.index, editor.session.target
@@ -201,6 +201,7 @@ class Pressing:
                     break
             else:
                 return lines
+            top = asked.rect.y if asked else 0.0
             self.press(widget)
             after, now = self.state(asked), self.words()
             changes = [f"{key} {value}" for key, value in after.items() if before.get(key) != value]
@@ -211,6 +212,7 @@ class Pressing:
             rows += [f"    + {' / '.join(come)}"] if 0 < len(come) <= MOST else []
             is_closed = asked is not None and asked not in robot.editor.dialogs.shown  # and so are all its words
             rows += [f"    - {' / '.join(gone)}"] if 0 < len(gone) <= MOST and not is_closed else []
+            rows += ["    its head moves"] if asked and not is_closed and abs(asked.rect.y - top) > 1 else []
             lines += map(self.row, rows)
 
     def row(self, text: str) -> str:
@@ -510,7 +512,8 @@ def of_panels(pressing: Pressing) -> Iterator[tuple[str, Callable[[], Dialog | N
     yield "thickness", lambda: take("thicken", symmetry="radial")
     yield "a selection by colour", lambda: take("select", select_by="colour", selection=SELECTED)
     yield "nothing selected", lambda: take("select", mask="thickness")
-    for which in (("stroke", 0), ("stroke", 1), ("force", 0), ("force", 1)):
+    those: tuple[Which, ...] = ("stroke", 0), ("stroke", 1), ("force", 0), ("force", 1)
+    for which in those:
         pressing.done -= {key for key in pressing.done if key[1] == "inspector" and key[0] == "slider"}
         yield f"bars: {which}", lambda which=which: take("twirl", "", (which,))
     yield "several bars", lambda: take("twirl", "", (("stroke", 0), ("stroke", 1)))
@@ -537,7 +540,8 @@ def of_panels(pressing: Pressing) -> Iterator[tuple[str, Callable[[], Dialog | N
     yield "a handle with keys", lambda: take("handle", "handle[2]")
     yield "a line of goals", lambda: take("handle", "handle[3]")
     yield "a pin", lambda: take("handle", "pin[1]")
-    for which in (("handle", 0), ("pin", 0)):
+    those = ("handle", 0), ("pin", 0)
+    for which in those:
         pressing.done -= {key for key in pressing.done if key[1] == "inspector" and key[0] == "slider"}
         yield f"bars: {which}", lambda which=which: take("twirl", "", (which,))
 
