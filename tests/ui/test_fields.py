@@ -728,6 +728,15 @@ def test_the_size_that_is_told_of_an_animation_is_the_one_that_is_written(
     assert (dialog.written == (61, 46)) == (ending != ".mp4")
 
 
+def test_a_name_that_is_proposed_goes_with_the_kind(dialog: ExportDialog, widgets: Widgets) -> None:
+    for kind in ("Warp map", "Picture", "Animation"):
+        widgets.click(kind)
+        assert dialog.name.endswith(" map" if kind == "Warp map" else " warped")
+    dialog.name = "mine"
+    widgets.click("Warp map")
+    assert dialog.name == "mine"
+
+
 def test_of_linear_light_a_kind_is_proposed_that_holds_it(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
     """Any other says what it loses; of a picture of 8 bits, each says what it is good for."""
     editor, eight = robot.editor, robot.editor.session.project.picture

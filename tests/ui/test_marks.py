@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from app.media.pictures import write_picture
+from app.model.handles import RecipeHandle
 from app.model.picture import Picture
 from app.ui.files import load_any
 from app.ui.theme import PALETTES
@@ -118,3 +119,25 @@ def test_the_split_shows_what_was_on_its_left(robot: Robot) -> None:
         int(row[part].sum()) for part in (slice(round(x) - 90, round(x) - 8), slice(round(x) + 8, round(x) + 90))
     )
     assert left > right + 5 > 25
+
+
+def test_over_the_original_there_are_no_marks(robot: Robot) -> None:
+    """Axes, the split and handles belong to the result."""
+    robot.see()
+    state, session = robot.editor.state, robot.editor.session
+    robot.move(5, 5)
+    robot.hold("\\", True)
+    robot.frame(count=2)
+    original = robot.pixels()
+    robot.hold("\\", False)
+    state.symmetry, state.split = "both", 0.3
+    session.edit("Handle", handle=(RecipeHandle(at=(0.3, 0.3), to=(0.4, 0.3)),))
+    robot.hold("\\", True)
+    robot.frame(count=2)
+    shown = robot.pixels()
+    canvas = robot.editor.view.canvas
+    there = slice(int(canvas.y), int(canvas.bottom)), slice(int(canvas.x), int(canvas.right))
+    np.testing.assert_array_equal(shown[there], original[there])
+    robot.hold("\\", False)
+    robot.frame(count=2)
+    assert (robot.pixels()[there] != original[there]).any(axis=-1).sum() > 100
