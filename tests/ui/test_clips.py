@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import time
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -294,6 +294,28 @@ def test_a_frame_is_awaited_until_it_is_the_one_that_is_shown() -> None:
     while ((best := reel.best()) is None or best[0] != 3) and time.monotonic() < deadline:
         time.sleep(0.001)
     assert (reel.awaits(2), reel.awaits(3)) == (True, False)
+    reel.close()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Losing(Counted):
+    """Of it something is lost when it is read."""
+
+    def pictures(
+        self, part: FrameRange = WHOLE, *_: Any, notice: Callable[[str], None] = print, **others: Any
+    ) -> Generator[tuple[int, Picture], None, None]:
+        notice("its depth is lost")
+        yield from super().pictures(part)
+
+
+def test_what_is_lost_of_a_clip_that_is_looked_at_is_told() -> None:
+    clip = Losing(path=Path("a"), width=2, height=2, bits=8, alpha=False, pixel_format="", fps=RATE, frames=5)
+    reel = Reel(clip, lambda picture: picture.pixels)
+    reel.want(3, runs=False)
+    deadline = time.monotonic() + 60
+    while not (words := reel.take_words()) and time.monotonic() < deadline:
+        time.sleep(0.001)
+    assert set(words) == {"its depth is lost"}
     reel.close()
 
 
