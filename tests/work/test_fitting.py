@@ -18,11 +18,12 @@ from app.media.landmarks import Pairs, read_pairs, write_pairs
 from app.media.maps import write_map
 from app.media.pictures import write_picture
 from app.media.recipes import read_recipe
+from app.media.source import open_source
 from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.progress import INTERRUPTED, Progress
 from app.work import fitting
-from app.work.fit_job import FitJob
+from app.work.fit_job import Fit, FitJob
 from app.work.fitting import LEAST_DET, Fitted, Trial, fitted
 from app.work.replay import Replay
 from solver.gl.device import Device
@@ -149,6 +150,16 @@ def test_pairs_of_which_some_are_frozen_are_each_told_once(device: Device):
         caught,
     )
     assert re.match(r"pair 3, pair 4 end up to [\d.]+ pixels from where they should be; handle", missed)
+
+
+def test_what_was_chosen_in_a_later_frame_of_a_clip_is_looked_for_there(device: Device, tmp_path: Path):
+    """Of the first frame, which is black, nothing is frozen; of the second everything."""
+    for number, grey in enumerate((0, 255)):
+        write_picture(tmp_path / f"f.{number:04d}.png", Picture(np.full((48, 64, 3), grey, np.uint8)))
+    opened = open_source(tmp_path / "f.%04d.png")
+    frozen = '[[mask]]\nkind = "picture"\nof = "frozen"\npicture = "source"\ntick = 0\nframe = 1\n'
+    fit = Fit(Recipe.parse(FREE + frozen), opened.picture, tmp_path, Pairs.points(PAIRS), 1, clip=opened.clip)
+    assert "their points are frozen" in fit.perform(device, Progress()).notices[0]
 
 
 def test_pairs_in_each_others_way_are_told_once_with_how_far_they_miss(device: Device):
