@@ -1037,3 +1037,14 @@ def test_a_drag_goes_on_when_a_panel_comes_up(robot: Robot, widgets: Widgets) ->
     robot.release()
     robot.rest()
     assert before != in_the_middle < session.recipe.fluid.drag
+
+
+def test_keys_go_through_widgets_while_a_dialog_is_open_and_no_longer(robot: Robot) -> None:
+    """Elsewhere Space and the arrows are the editor's, also after it."""
+    through, seen = imgui.ConfigFlags_.nav_enable_keyboard.value, list[bool]()
+    for key in ("", "ctrl+e", "escape", "f1", "escape"):
+        if key:
+            robot.key(key)
+        robot.frame(count=3)
+        seen.append(bool(imgui.get_io().config_flags & through))
+    assert seen == [False, True, False, True, False]
