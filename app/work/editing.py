@@ -66,6 +66,7 @@ class Editing(Painting):
         tick = self._go_on()
         self.playing = self.coasting = False
         self._use_edited(with_change(self._base, tick, settings, lasts))
+        self._changes_at = tick
         self._send(self.end)
 
     def preview(self, **parts: Any) -> None:

@@ -148,10 +148,10 @@ class Playing(Editing):
     def retract(self) -> None:
         """Take back what was committed last, unless it had changed nothing: Undo would take what was done before it.
 
-        The playhead stays where it is: the hand goes on with what it has begun there.
+        The playhead stays where it is, or goes back to where a setting was changed: the hand goes on with that there.
         """
         if self._has_committed:
-            tick = self.target
+            tick = self.target if self._changed_at is None else self._changed_at
             self.undo()
             self.seek(tick)
 

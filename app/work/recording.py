@@ -79,6 +79,9 @@ class Recording:
         self._beyond = 0
         self._coasted = 0
         self._has_committed = False  # the last commit was an edit, and not of nothing
+        # Ticks at which what is previewed, and what was committed last, change a setting; None if they do not.
+        self._changes_at: int | None = None
+        self._changed_at: int | None = None
 
     @property
     def recipe(self) -> Recipe:
@@ -316,7 +319,7 @@ class Recording:
     def _show(self, recipe: Recipe) -> None:
         """Another state of the work, with the playhead at its end."""
         moment = self.moment
-        self.playing = self.coasting = self._went_back = False
+        self.playing = self.coasting = self._went_back = self._has_committed = False
         self.replay.checkpoint()
         self._base = recipe
         self._use(recipe)
@@ -330,5 +333,6 @@ class Recording:
         before = history.recipe
         history.commit(name, self._live)
         self._has_committed = history.recipe is not before
+        self._changed_at, self._changes_at = self._changes_at, None
         self._base = self._live
         self.changes += 1

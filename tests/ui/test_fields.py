@@ -19,8 +19,8 @@ from app.media.maps import MAP_ENDINGS
 from app.media.pictures import write_picture
 from app.media.project import from_picture
 from app.model.picture import Picture
-from app.model.presets import PUTTY
-from app.model.recipe import Output
+from app.model.presets import DEFAULT, PUTTY
+from app.model.recipe import Output, Recipe
 from app.model.strokes import BrushPath, Change, Stroke
 from app.progress import Progress
 from app.ui.editor_state import EditorState
@@ -841,6 +841,52 @@ def test_a_double_click_on_a_slider_leaves_the_playhead_where_it_is(robot: Robot
     robot.frame(count=2)
     session.settle()
     assert (session.target, session.recipe.amount, session.document.history.index) == (at, 1.0, before)
+
+
+@pytest.mark.parametrize("at", [0, 12])
+def test_a_double_click_on_a_setting_changes_it_where_the_playhead_was(robot: Robot, widgets: Widgets, at: int) -> None:
+    """Its first click has sent the playhead on, to behind what is recorded with the change."""
+    session = robot.editor.session
+    session.begin_with(drag=0.5)
+    stroke = Stroke(tool="push", samples=((0, 0.3, 0.5, 1.0), (20, 0.4, 0.4, 1.0)))
+    session.edit("Push", stroke=(stroke,), duration=1.0)
+    before, found = len(session.document.history.entries), list[Recipe]()
+    for clicks in (1, 2):
+        session.seek(at)
+        session.settle()
+        widgets.look()
+        robot.frame(dt=1.0)  # or it would be a click more of those before
+        for _ in range(clicks):
+            robot.click(*widgets.at["Drag"].middle)
+        robot.frame(count=2)
+        session.settle()
+        found.append(session.recipe)
+        assert len(session.document.history.entries) == before + 1
+        session.undo()
+        session.settle()
+    once, twice = found
+    assert [change.tick for change in twice.change] == [change.tick for change in once.change] == [at]
+    assert (twice.stroke, twice.duration) == (once.stroke, once.duration)
+    assert twice.change[0].drag == DEFAULT.drag != once.change[0].drag
+
+
+@pytest.mark.parametrize("key", ["home", "end", "space", "tab", "escape", "delete", "backspace"])
+def test_keys_of_an_open_list_are_its_own(robot: Robot, widgets: Widgets, key: str) -> None:
+    only(robot)
+    robot.drag((0.3, 0.3), (0.5, 0.5), steps=4)
+    robot.rest()
+    state, session = robot.editor.state, robot.editor.session
+    state.sections["symmetry"] = True
+    session.seek(3)
+    session.settle()
+    state.selected = "push"
+    widgets.look()
+    robot.click(*widgets.at["##symmetry"].middle)
+    robot.frame(count=2)
+    before = session.recipe, session.target, session.playing, state.selected, state.inspector
+    robot.key(key)
+    robot.frame(count=3)
+    assert (session.recipe, session.target, session.playing, state.selected, state.inspector) == before
 
 
 def test_a_key_that_chooses_in_an_open_list_does_nothing_else(robot: Robot, widgets: Widgets) -> None:
