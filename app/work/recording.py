@@ -315,6 +315,7 @@ class Recording:
     def _use_edited(self, recipe: Recipe) -> None:
         check_size(recipe, self._base)
         self._use(recipe)
+        self._changes_at = None
 
     def _show(self, recipe: Recipe) -> None:
         """Another state of the work, with the playhead at its end."""

@@ -131,3 +131,16 @@ class Golden:
         if WRITES:
             rows = (f"{name}: {' '.join(f'{number:.7g}' for number in row)}\n" for name, row in self._rows.items())
             self._path.write_text("".join(rows), "utf-8")
+
+
+def scenes_of(file: Path, version: str) -> Iterator[dict[str, list[str]]]:
+    """The lines of a golden by scene, for a fixture; where it is to be written anew, what the tests put in there.
+
+    `version`: of what has drawn it, its first line.
+    """
+    parts = {} if WRITES else dict(part.split("\n", 1) for part in file.read_text("utf-8").split("== ")[1:])
+    scenes = {name: text.splitlines() for name, text in parts.items()}
+    yield scenes
+    if WRITES:
+        lines = [line for name, found in scenes.items() for line in (f"== {name}", *found)]
+        file.write_text("\n".join([version, *lines]) + "\n", "utf-8")

@@ -31,7 +31,7 @@ from app.work import playing, recording
 from solver.gl.device import Device
 from support.drawn import Drawn, differences, new_in
 from support.editing import Robot, add_bars, small_project, summary
-from support.golden import GOLDEN, WRITES
+from support.golden import GOLDEN, WRITES, scenes_of
 from support.widgets import Widgets
 
 FILE = GOLDEN / "drawn.txt"
@@ -279,12 +279,7 @@ TOURS = (tools_and_marks, handles, time, dialogs, panels)
 @pytest.fixture(scope="module")
 def golden() -> Iterator[dict[str, list[str]]]:
     """What was written down, by tour and scene; or, where it is to be written anew, what is found."""
-    parts = {} if WRITES else dict(part.split("\n", 1) for part in FILE.read_text("utf-8").split("== ")[1:])
-    scenes = {name: text.splitlines() for name, text in parts.items()}
-    yield scenes
-    if WRITES:
-        lines = [line for name, found in scenes.items() for line in (f"== {name}", *found)]
-        FILE.write_text("\n".join([imgui.get_version(), *lines]) + "\n", "utf-8")
+    yield from scenes_of(FILE, imgui.get_version())
 
 
 @pytest.fixture(autouse=True)

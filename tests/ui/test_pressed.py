@@ -44,7 +44,7 @@ from app.work.recovery import Found
 from solver.gl.device import Device
 from support.drawn import Drawn, new_in
 from support.editing import Robot, add_bars, export_dialog, pattern, small_project, summary
-from support.golden import GOLDEN, WRITES
+from support.golden import GOLDEN, WRITES, scenes_of
 from support.widgets import Widget, Widgets
 
 FILE = GOLDEN / "pressed.txt"
@@ -72,12 +72,7 @@ def golden() -> Iterator[dict[str, list[str]]]:
     """What was written down, by scene; or, where it is to be written anew, what is found."""
     if not WRITES and FILE.read_text("utf-8").split("\n")[0] != imgui.get_version():
         pytest.skip("widgets lie elsewhere in other versions of imgui")
-    parts = {} if WRITES else dict(part.split("\n", 1) for part in FILE.read_text("utf-8").split("== ")[1:])
-    scenes = {name: text.splitlines() for name, text in parts.items()}
-    yield scenes
-    if WRITES:
-        lines = [line for name, found in scenes.items() for line in (f"== {name}", *found)]
-        FILE.write_text("\n".join([imgui.get_version(), *lines]) + "\n", "utf-8")
+    yield from scenes_of(FILE, imgui.get_version())
 
 
 def leaves(value: Any, path: str = "") -> Iterator[tuple[str, str]]:

@@ -757,6 +757,24 @@ def test_nor_does_one_that_the_person_chooses(session: Session) -> None:
     assert session.recipe == made
 
 
+def test_what_was_previewed_and_dropped_sends_the_playhead_nowhere_later(session: Session) -> None:
+    """A setting is dragged and Undo pressed meanwhile; what is then done and taken back leaves the playhead alone."""
+    paint(session, "push", (0.4, 0.5), (0.6, 0.5))
+    session.settle()
+    session.seek(2)
+    session.settle()
+    session.preview_change(drag=1.0)
+    session.undo()
+    session.redo()
+    session.seek(session.end)
+    session.settle()
+    end = session.target
+    session.edit("Amount", amount=0.5)
+    session.retract()
+    session.settle()
+    assert (session.target, session.recipe.amount) == (end, 1.0)
+
+
 def test_a_grid_that_is_not_wanted_any_more_has_nothing_on_the_gpu(
     session: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
