@@ -306,17 +306,19 @@ def test_works_that_are_opened_in_between_lead_where_they_did(
 
     monkeypatch.setattr(files, "fresh_recipe", coarse)
     name, dice, found = named(golden, f"works {number}"), Random(f"works {number}"), dict[str, list[float]]()
-    files_in(tmp_path)
+    folder = tmp_path / "works"  # whose name is kept, and pytest numbers its own
+    folder.mkdir()
+    files_in(folder)
     likes = Preferences(auto_quality=False, embed=number == 0)
-    with Robot(device, small_project(tmp_path, 16), (900, 600), preferences=likes) as robot:
+    with Robot(device, small_project(folder, 16), (900, 600), preferences=likes) as robot:
         widgets, editor, what = Widgets(robot, monkeypatch), robot.editor, Sum()
         for step in range(1, WORKS + 1):
-            go_on(robot, widgets, tmp_path, dice)
+            go_on(robot, widgets, folder, dice)
             editor.session.settle()
             editor.session.pause()
             robot.until(lambda: not editor.workspace.awaits_frame)
             editor.commands.closed = False
-            told = [message.text.replace(str(tmp_path), "FOLDER") for message in editor.messages.shown]
+            told = [message.text.replace(str(folder), "FOLDER") for message in editor.messages.shown]
             what.add(now(robot) | {"messages": told})
             if step % 4 == 0:
                 found[f"{name} {step}"], what = what.row, Sum()
