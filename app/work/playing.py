@@ -149,11 +149,13 @@ class Playing(Editing):
         """Take back what was committed last, unless it had changed nothing: Undo would take what was done before it.
 
         The playhead stays where it is, or goes back to where a setting was changed: the hand goes on with that there.
+        What has been played all along, as with the amount, plays on.
         """
         if self._has_committed:
-            tick = self.target if self._changed_at is None else self._changed_at
+            tick, plays = self.target if self._changed_at is None else self._changed_at, self.playing
             self.undo()
             self.seek(tick)
+            self.playing = plays
 
     def seek(self, tick: int) -> None:
         """Send the playhead to a tick of the recording; it arrives over the next frames."""

@@ -843,6 +843,26 @@ def test_a_double_click_on_a_slider_leaves_the_playhead_where_it_is(robot: Robot
     assert (session.target, session.recipe.amount, session.document.history.index) == (at, 1.0, before)
 
 
+def test_a_double_click_on_amount_lets_the_recording_play_on(robot: Robot, widgets: Widgets) -> None:
+    """As one click does: how much of the warp is seen has nothing to do with time."""
+    session = robot.editor.session
+    stroke = Stroke(tool="push", samples=((0, 0.3, 0.5, 1.0), (20, 0.4, 0.4, 1.0)))
+    session.edit("Push", stroke=(stroke,), duration=10.0)
+    session.seek(0)
+    session.settle()
+    session.play()
+    widgets.look()
+    assert session.playing
+    for _ in range(2):
+        robot.click(*widgets.at["Amount"].middle)
+    robot.frame(count=2)
+    then = session.tick
+    robot.frame(count=10)
+    assert session.recipe.amount == 1.0
+    assert session.playing
+    assert session.tick > then
+
+
 @pytest.mark.parametrize("at", [0, 12])
 def test_a_double_click_on_a_setting_changes_it_where_the_playhead_was(robot: Robot, widgets: Widgets, at: int) -> None:
     """Its first click has sent the playhead on, to behind what is recorded with the change."""
