@@ -376,6 +376,8 @@ def sequence_writer(
 ) -> Iterator[NumberedWriter[T]]:
     """Yield a function that writes one numbered file by `write_one`, which lets it appear whole; see `replacing`.
 
+    Several threads may call it at a time, if they give numbers.
+
     Args:
         path: such as `name.%04d.png`; numbered from 0 where no number is given.
         written: hears of each file, by its number, and by its temporary name before it appears.
@@ -390,8 +392,9 @@ def sequence_writer(
         nonlocal last
         if cancel():
             raise Cancelled
-        last = last + 1 if number is None else number
-        write_one(numbered(path, last), item, partial(written, last))
+        # `last` may be another thread's by the next line.
+        last = own = last + 1 if number is None else number
+        write_one(numbered(path, own), item, partial(written, own))
 
     yield write
     if last == -1 and not resumed:

@@ -261,7 +261,8 @@ class _Applying:
                 passed=progress.advance,
                 written=noting({self.output: record} if record else {}, self.output, self._whole),
             )
-            written = write_all(((n, self._frame(n, one, is_own)) for n, one in pictures), writer, progress)
+            made = ((number, self._frame(number, one, is_own)) for number, one in pictures)
+            written = write_all(made, writer, self.output, progress)
         progress.expect(-kept.count)
         self.notices += [losses.said, kept.said(written)]
         return written

@@ -6,6 +6,7 @@ One long class: what a job simulates, looks up and writes must go in one order.
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import asdict, dataclass, replace
@@ -54,6 +55,7 @@ Numbered = tuple[int, Frame]
 TakeMap = Callable[[tuple[int, Displacement]], None]
 
 POINTS_AT_ONCE = 1_000_000  # of a map
+MOST_WRITERS = 4  # files of a sequence that are encoded at a time; each holds a frame more in memory
 PIXELS_A_STEP = 100_000  # whose look-up, or writing as PNG, takes about as long on a CPU as a step on 256 cells
 
 
@@ -231,7 +233,7 @@ class _Export:
             if maps is not None and maps.is_sequence:
                 cancel, note = self.progress.cancel, noting(records, maps.path, self.whole[maps.path])
                 writer = map_writer(maps.path, maps.kind, cancel=cancel, written=note, resumed=self.outputs.resume)
-                take_map = stack.enter_context(in_order(stack.enter_context(writer)))
+                take_map = stack.enter_context(numbered_behind(stack.enter_context(writer), maps.path))
             kept = Kept(records.values() if self.outputs.resume else [])
             if clip is not None:
                 if not clip.is_whole:
@@ -245,7 +247,8 @@ class _Export:
                 self._look(job.picture)
                 missing = [(number, position) for number, position in enumerate(wanted, first) if not kept(number)]
                 frames = self._frames_of_picture(missing, take_map)
-            written = write_all(frames, self._writer(first, records) if file is not None else None, self.progress)
+            writer = self._writer(first, records) if file is not None else None
+            written = write_all(frames, writer, file, self.progress)
             self.progress.expect(-kept.count)
             if said := kept.said(written):
                 self.pictures.notice(said)
@@ -522,21 +525,27 @@ class Kept:
         return f"{self.count} of {self.count + written} frames were whole and are kept" if self.count else ""
 
 
-def in_order(write: NumberedWriter[T]) -> AbstractContextManager[Callable[[tuple[int, T]], None]]:
-    """`write`, in a thread of its own; see `write_behind`."""
-    return write_behind(lambda item: write(item[1], item[0]))
+def numbered_behind(write: NumberedWriter[T], path: Path) -> AbstractContextManager[Callable[[tuple[int, T]], None]]:
+    """`write`, in a thread of its own, or in several for the files of a sequence; see `write_behind`."""
+    threads = min(os.cpu_count() or 1, MOST_WRITERS) if is_sequence(path) else 1
+    return write_behind(lambda item: write(item[1], item[0]), threads)
 
 
 def write_all(
-    frames: Iterable[Numbered], writer: AbstractContextManager[FrameWriter] | None, progress: Progress
+    frames: Iterable[Numbered],
+    writer: AbstractContextManager[FrameWriter] | None,
+    path: Path | None,
+    progress: Progress,
 ) -> int:
     """Write the numbered frames of an animation, each while the next one is made; says how many there were.
 
-    writer: None if they are made for something else.
+    writer, path: None if they are made for something else.
     """
     count = 0
     with ExitStack() as stack:
-        write = stack.enter_context(in_order(stack.enter_context(writer))) if writer is not None else None
+        write = None
+        if writer is not None and path is not None:
+            write = stack.enter_context(numbered_behind(stack.enter_context(writer), path))
         for frame in frames:
             if write is not None:
                 write(frame)

@@ -17,8 +17,10 @@ _END = object()
 
 
 @contextmanager
-def write_behind(write: Callable[[T], None]) -> Iterator[Callable[[T], None]]:
+def write_behind(write: Callable[[T], None], threads: int = 1) -> Iterator[Callable[[T], None]]:
     """Yield a function that hands an item to `write` in another thread, and waits once `DEPTH` items lie there.
+
+    With several threads `write` is called by all of them at a time, and items may overtake each other.
 
     What `write` raises is raised by the next call, or when the block ends; all has been written once it has ended, well
     or with a `UserError`. What is handed over must not be changed afterwards.
@@ -41,8 +43,9 @@ def write_behind(write: Callable[[T], None]) -> Iterator[Callable[[T], None]]:
             raise failed[0]
         waiting.put(item)
 
-    thread = threading.Thread(target=work, name="writer", daemon=True)
-    thread.start()
+    workers = [threading.Thread(target=work, name="writer", daemon=True) for _ in range(threads)]
+    for worker in workers:
+        worker.start()
     try:
         yield put
     except UserError:
@@ -51,8 +54,10 @@ def write_behind(write: Callable[[T], None]) -> Iterator[Callable[[T], None]]:
         stopped.set()
         raise
     finally:
-        waiting.put(_END)
-        thread.join()
+        for _ in workers:
+            waiting.put(_END)
+        for worker in workers:
+            worker.join()
     if failed:
         raise failed[0]
 

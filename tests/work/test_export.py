@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import subprocess
+import threading
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -582,6 +583,31 @@ def test_what_is_handed_over_arrives_in_order():
     assert came == list(range(100))
     with prefetch(iter(range(100))) as items:
         assert list(items) == list(range(100))
+
+
+def test_several_threads_write_at_a_time_and_all_is_written():
+    """Each waits until another one writes, too: one thread alone would wait in vain."""
+    together, came = threading.Barrier(2), list[int]()
+
+    def write(number: int) -> None:
+        together.wait(timeout=60)
+        came.append(number)
+
+    with write_behind(write, threads=2) as put:
+        for number in range(10):
+            put(number)
+    assert sorted(came) == list(range(10))
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_what_several_threads_cannot_write_is_heard(threads: int):
+    def write(number: int) -> None:
+        if number == 5:
+            raise UserError("the disk is full")
+
+    with pytest.raises(UserError, match="disk is full"), write_behind(write, threads) as put:
+        all(put(number) is None for number in range(1000))
+    assert not [one for one in threading.enumerate() if one.name == "writer"]
 
 
 def test_what_was_handed_over_before_a_fault_is_written():
