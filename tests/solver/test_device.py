@@ -56,6 +56,16 @@ def limits(**environment: str) -> dict:
     return json.loads(ran.stdout)
 
 
+def test_limits_are_what_opengl_tells(device: Device):
+    told, limits = device.ctx.info, device.limits
+    assert (limits.vendor, limits.renderer, limits.version) == tuple(
+        told[f"GL_{name}"] for name in ("VENDOR", "RENDERER", "VERSION")
+    )
+    assert limits.max_texture_size == told["GL_MAX_TEXTURE_SIZE"]
+    assert limits.max_draw_buffers == told["GL_MAX_DRAW_BUFFERS"]
+    assert limits.max_texture_units == told["GL_MAX_TEXTURE_IMAGE_UNITS"]
+
+
 @linux
 def test_without_egl_and_without_a_display_the_message_says_what_to_install():
     error = limits(**NO_EGL)["error"]

@@ -694,6 +694,24 @@ def test_a_link_among_states_is_not_followed(folder: Path):
     assert contents(folder / "a") == contents(folder / "b")
 
 
+def test_a_name_of_two_lines_is_told_in_one_and_once(folder: Path, fluidwarp: Run) -> None:
+    (folder / "two\nlines.png").write_bytes(b"nothing")
+    ran = fluidwarp(folder, "render", "a.toml", "p0.png", "two\nlines.png", "-o", "out")
+    first, *others = ran.stderr.splitlines()
+    assert others == ["fluidwarp: 1 of 2 pictures failed; all others are written"]
+    assert first.startswith(rf"fluidwarp: Cannot read {folder}/two\nlines.png: it is not a picture")
+    assert first.count("lines.png") == 1
+
+
+def test_a_map_fits_its_picture_whatever_the_result_s_size(folder: Path, fluidwarp: Run) -> None:
+    """1000 x 333 pixels become 100 x 33, which are of other proportions."""
+    write_picture(folder / "wide.png", Picture(np.zeros((333, 1000, 3), np.uint8)))
+    np.save(folder / "wide.npy", np.zeros((333, 1000, 2), np.float32))
+    ran = fluidwarp(folder, "apply", "wide.npy", "wide.png", "-o", "small.png", "--size", "100")
+    assert (ran.returncode, ran.stderr) == (0, "")
+    assert read_picture(folder / "small.png").pixels.shape == (33, 100, 3)
+
+
 def test_two_results_whose_names_differ_in_capitals_alone(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """They are one file on most disks of macOS and Windows, and the one picture replaced the other without a word."""
     names = [folder / "p.png", folder / "P.png", folder / "p.jpg"]
