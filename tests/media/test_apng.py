@@ -98,6 +98,21 @@ def test_frames_are_laid_over_one_another_as_alpha_says(tmp_path: Path, seed: in
         assert np.abs(other[..., 3] - wanted[..., 3]).max() <= 3
 
 
+@pytest.mark.parametrize(
+    ("shown", "rate", "steps"),
+    [((33, 40), 1000, (33, 40)), ((20, 30), 100, (2, 3)), ((40, 40), 25, None), ((1, 2), 1000, (1, 2))],
+)
+def test_the_steps_of_frames_are_the_longest_that_fit(
+    tmp_path: Path, shown: tuple[int, int], rate: int, steps: tuple[int, int] | None
+):
+    """By milliseconds, up to 1000 a second."""
+    frames = [Image.new("RGBA", (WIDTH, HEIGHT), (number, 0, 0, 255)) for number in range(2)]
+    frames[0].save(path := tmp_path / "a.webp", save_all=True, append_images=frames[1:], duration=shown, lossless=True)
+    clip = read_pages(path, read_picture(path))
+    assert clip is not None
+    assert (clip.fps, clip.durations) == (rate, steps)
+
+
 def test_what_covers_all_or_nothing_changes_no_bit(tmp_path: Path):
     rng = np.random.default_rng(0)
     under, over = some(rng), some(rng)

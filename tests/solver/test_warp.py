@@ -25,7 +25,7 @@ from solver.warp.frozen import FADED, Frozen
 from solver.warp.inverse import ForwardMap
 from solver.warp.map import WarpMap
 from solver.warp.remapping import FEW_TILES, MOST_TILES, REMAP_STEPS
-from solver.warp.state import MOST_CLOSED
+from solver.warp.state import MOST_CLOSED, closed_in
 from solver.warp.submap import Level
 from support import reference
 from support.arrays import assert_near
@@ -1593,3 +1593,26 @@ def test_the_papers_map_is_exact_where_all_moves_alike(device: Device) -> None:
     inner = np.stack(np.meshgrid(np.linspace(0.2, 0.8, 9), np.linspace(0.2, 0.55, 7)), axis=-1).reshape(-1, 2)
     np.testing.assert_allclose(warp.at(inner), np.broadcast_to((-0.05, 0.025), inner.shape), atol=1e-5)
     warp.release()
+
+
+@pytest.mark.parametrize(
+    ("names", "closed"),
+    [
+        (["moved", "closed map 1", "closed map 0"], ["closed map 0", "closed map 1"]),
+        (["closed map 0", "undone 1"], ["closed map 0", "undone 1"]),
+        (["undone 0"], None),
+        (["undone 0", "closed map 1"], None),
+        (["closed map 0", "undone 1", "undone 2"], None),
+        (["closed map 0", "closed map 2"], None),
+        (["closed map 0", "undone 0"], None),
+        (["closed map x"], None),
+    ],
+)
+def test_saved_closed_maps_are_in_a_row_and_what_is_undone_comes_after_one(
+    names: list[str], closed: list[str] | None
+) -> None:
+    if closed is not None:
+        assert closed_in(names) == closed
+        return
+    with pytest.raises(ValueError, match="closed maps"):
+        closed_in(names)
