@@ -14,6 +14,8 @@ from solver.gl.device import Device
 from solver.grid import Grid
 from solver.limits import LARGEST_VISCOSITY, LONGEST_STEP
 from solver.params import FluidParams, Walls
+from solver.viscosity.deflation import CoarseSpace
+from solver.viscosity.operator import Coefficients
 from solver.viscosity.parts import BROAD, find_parts
 
 
@@ -90,6 +92,27 @@ def test_cores_are_made_of_squares() -> None:
         parts = find_parts(stiff, stiffness, open_u, open_v, 8)
         in_core = (parts.of_u > 0) & (parts.of_u <= parts.cores)
         np.testing.assert_array_equal(in_core[:, 1:], wanted[:, 1:] | wanted[:, :-1])
+
+
+def test_the_mean_motions_of_parts_are_those_that_moved_them() -> None:
+    """Of cores across, down and turning, of runs along: summed up here over the faces of each part, one by one."""
+    rng, stiff = np.random.default_rng(0), np.zeros((24, 28), bool)
+    stiff[3:9, 3:14] = stiff[12:21, 16:22] = stiff[2, 18:26] = stiff[14:22, 6] = True
+    is_open = np.ones_like(stiff)
+    parts = find_parts(stiff, np.where(stiff, 1e5, 1.0), is_open, is_open, 32)
+    assert (parts.cores, parts.runs_of_u > 0, parts.count > 2 + parts.runs_of_u) == (2, True, True)
+    level = Coefficients.uniform(1e5, (28, 24), (14, 12), (1.0, 1.0), (False,) * 4)
+    space = CoarseSpace(parts, level, 0.0, (0, 0))
+    unknowns = rng.standard_normal(len(space.part))
+    across, down, turn = space.motions(unknowns).T
+    y, x = (np.arange(count) + 0.5 for count in stiff.shape)
+    u, v = across[parts.of_u] - turn[parts.of_u] * y[:, None], down[parts.of_v] + turn[parts.of_v] * x
+    loads = []
+    for part, motion in zip(space.part, space.motion, strict=True):
+        (left, top), in_u, in_v = space.centres[part], parts.of_u == part, parts.of_v == part
+        turned = (v * (x - left))[in_v].sum() - (u * (y[:, None] - top))[in_u].sum()
+        loads.append((u[in_u].sum(), v[in_v].sum(), turned)[motion])
+    np.testing.assert_allclose(space.means(np.array(loads)), unknowns, rtol=1e-9)
 
 
 @pytest.mark.parametrize("turn", ["", "x", "y"])

@@ -403,6 +403,12 @@ def test_a_saved_moment_is_a_copy_and_comes_back(device: Device, kind: type[Flui
         with pytest.raises(ValueError, match="of no time"):
             fluid.restore(timeless)
         timeless.release()
+    for name in state.fields:
+        whole = state.arrays()
+        for part in ({}, {name: whole[name][:-1]}, {name: whole[name].astype(np.float16)}):
+            rest = {key: values for key, values in whole.items() if key != name} | part
+            with pytest.raises(ValueError, match=f"its {name} is missing or of another size"):
+                state.with_arrays(device, rest)
     elsewhere = kind(device, Grid(24, 16, (0.5, 1 / 3), (0.1, 0.1), (1.0, 2 / 3)))  # as many cells, of half the size
     for wrong in (other, elsewhere):
         with pytest.raises(ValueError, match="another grid"):
