@@ -174,13 +174,12 @@ class Still:
     def stop(self, then: object = None) -> None: ...
 
 
-def work(robot: Robot, places: object) -> Iterator[str]:
-    """What is found at the start, a clip, and what goes on in other processes; in the light theme."""
-    editor, folder = robot.editor, robot.editor.session.project.folder
-    editor.preferences.theme = "light"
+def restoring(robot: Robot, places: object) -> Iterator[str]:
+    """What is found at the start: more than fits without scrolling, and one."""
+    editor = robot.editor
     recipe = Recipe(stroke=(Stroke(tool="push", samples=((0, 0.3, 0.5, 1.0),)),), pin=(RecipePin(at=(0.7, 0.3)),))
     entries = (Entry("Open", Recipe(), 0), Entry("Push", recipe, 0))
-    origin = Origin("a picture with a long name, and more than that", str(folder), None, False, False, 0, 0)
+    origin = Origin("a picture with a long name, and more than that", "/of/somebody", None, False, False, 0, 0)
     held: Any = None  # which nobody lets go of
     found = [Found(held, origin, Work(entries, 1, Recipe()), datetime(2024, 12, 24, 20)) for _ in range(6)]
     source: Any = SimpleNamespace(offered=found, later=found.clear)
@@ -190,6 +189,13 @@ def work(robot: Robot, places: object) -> Iterator[str]:
         yield f"{count} works to restore"
         offer.close()
         robot.frame(count=2)
+
+
+def work(robot: Robot, places: object) -> Iterator[str]:
+    """What is found at the start, a clip, and what goes on in other processes; in the light theme."""
+    editor, folder = robot.editor, robot.editor.session.project.folder
+    editor.preferences.theme = "light"
+    yield from restoring(robot, places)
     with animation_writer(folder / "clip.apng", Fraction(5)) as write:
         for _ in range(3):
             write(pattern(96, 64).pixels)
@@ -295,7 +301,7 @@ PLACES = {"add_circle": 2, "add_circle_filled": 2, "add_polyline": 6, "add_text"
 ACROSS, DOWN, WIDE, THIN = 6.0, 2.0, 5.0, 0.3  # points that are no fault: of places, widths, and thicknesses
 
 
-@pytest.mark.parametrize("tour", [time, over], ids=lambda tour: tour.__name__)
+@pytest.mark.parametrize("tour", [time, over, restoring], ids=lambda tour: tour.__name__)
 def test_at_200_percent_all_is_twice_as_far_apart_and_twice_as_large(
     device: Device, tmp_path: Path, tour: object, monkeypatch: pytest.MonkeyPatch
 ) -> None:
