@@ -27,7 +27,7 @@ from app.media.record import Record, digest_of, digest_of_file
 from app.media.source import Source, open_source
 from app.model.picture import Picture
 from app.progress import Progress
-from app.work.export import Kept, Report, Target, noting, steps_for, write_all
+from app.work.export import Kept, Report, Target, noting, steps_for, write_all, writers_for
 from app.work.jobs import check_result, longer_side
 from app.work.layers import resample_layers
 from app.work.map_sampler import MapSampler, inverted
@@ -262,7 +262,7 @@ class _Applying:
                 written=noting({self.output: record} if record else {}, self.output, self._whole),
             )
             made = ((number, self._frame(number, one, is_own)) for number, one in pictures)
-            written = write_all(made, writer, self.output, progress)
+            written = write_all(made, writer, writers_for(self.output, self.size), progress)
         progress.expect(-kept.count)
         self.notices += [losses.said, kept.said(written)]
         return written

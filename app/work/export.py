@@ -55,7 +55,8 @@ Numbered = tuple[int, Frame]
 TakeMap = Callable[[tuple[int, Displacement]], None]
 
 POINTS_AT_ONCE = 1_000_000  # of a map
-MOST_WRITERS = 4  # files of a sequence that are encoded at a time; each holds a frame more in memory
+MOST_WRITERS = 4  # threads that encode files of a sequence; each holds a frame more in memory
+PIXELS_WRITTEN = 2**26  # at a time, of these files together
 PIXELS_A_STEP = 100_000  # whose look-up, or writing as PNG, takes about as long on a CPU as a step on 256 cells
 
 
@@ -233,7 +234,8 @@ class _Export:
             if maps is not None and maps.is_sequence:
                 cancel, note = self.progress.cancel, noting(records, maps.path, self.whole[maps.path])
                 writer = map_writer(maps.path, maps.kind, cancel=cancel, written=note, resumed=self.outputs.resume)
-                take_map = stack.enter_context(numbered_behind(stack.enter_context(writer), maps.path))
+                threads = writers_for(maps.path, self._map_size(maps))
+                take_map = stack.enter_context(numbered_behind(stack.enter_context(writer), threads))
             kept = Kept(records.values() if self.outputs.resume else [])
             if clip is not None:
                 if not clip.is_whole:
@@ -247,8 +249,11 @@ class _Export:
                 self._look(job.picture)
                 missing = [(number, position) for number, position in enumerate(wanted, first) if not kept(number)]
                 frames = self._frames_of_picture(missing, take_map)
-            writer = self._writer(first, records) if file is not None else None
-            written = write_all(frames, writer, file, self.progress)
+            if file is None:
+                written = write_all(frames, None, 0, self.progress)
+            else:
+                threads = writers_for(file, self.size)
+                written = write_all(frames, self._writer(first, records), threads, self.progress)
             self.progress.expect(-kept.count)
             if said := kept.said(written):
                 self.pictures.notice(said)
@@ -525,27 +530,33 @@ class Kept:
         return f"{self.count} of {self.count + written} frames were whole and are kept" if self.count else ""
 
 
-def numbered_behind(write: NumberedWriter[T], path: Path) -> AbstractContextManager[Callable[[tuple[int, T]], None]]:
-    """`write`, in a thread of its own, or in several for the files of a sequence; see `write_behind`."""
-    threads = min(os.cpu_count() or 1, MOST_WRITERS) if is_sequence(path) else 1
+def writers_for(path: Path, size: tuple[int, int]) -> int:
+    """How many threads write pictures of this size to `path`: several, if it is a sequence and they fit in memory."""
+    if not is_sequence(path):
+        return 1
+    return max(1, min(os.cpu_count() or 1, MOST_WRITERS, PIXELS_WRITTEN // (size[0] * size[1])))
+
+
+def numbered_behind(write: NumberedWriter[T], threads: int) -> AbstractContextManager[Callable[[tuple[int, T]], None]]:
+    """`write`, in so many threads of its own; see `write_behind`."""
     return write_behind(lambda item: write(item[1], item[0]), threads)
 
 
 def write_all(
     frames: Iterable[Numbered],
     writer: AbstractContextManager[FrameWriter] | None,
-    path: Path | None,
+    threads: int,
     progress: Progress,
 ) -> int:
     """Write the numbered frames of an animation, each while the next one is made; says how many there were.
 
-    writer, path: None if they are made for something else.
+    Args:
+        writer: None if they are made for something else.
+        threads: that write.
     """
     count = 0
     with ExitStack() as stack:
-        write = None
-        if writer is not None and path is not None:
-            write = stack.enter_context(numbered_behind(stack.enter_context(writer), path))
+        write = stack.enter_context(numbered_behind(stack.enter_context(writer), threads)) if writer else None
         for frame in frames:
             if write is not None:
                 write(frame)

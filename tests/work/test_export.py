@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import subprocess
 import threading
@@ -36,7 +37,7 @@ from app.model.recipe import Recipe
 from app.model.timeline import Timeline
 from app.progress import Progress
 from app.work.apply_job import Application, MapSource, converted, inverted
-from app.work.export import Target, displacement, looked_up, run, shown_positions
+from app.work.export import Target, displacement, looked_up, run, shown_positions, writers_for
 from app.work.jobs import Job, MapOutput, Outputs
 from app.work.replay import Replay
 from app.work.threads import prefetch, write_behind
@@ -597,6 +598,16 @@ def test_several_threads_write_at_a_time_and_all_is_written():
         for number in range(10):
             put(number)
     assert sorted(came) == list(range(10))
+
+
+def test_several_threads_write_sequences_alone_and_no_more_than_fits_in_memory(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(os, "cpu_count", lambda: 16)
+    assert writers_for(Path("a.mp4"), (640, 480)) == 1
+    assert writers_for(Path("a.%04d.png"), (640, 480)) == 4
+    assert writers_for(Path("a.%04d.png"), (6000, 4000)) == 2
+    assert writers_for(Path("a.%04d.png"), (12_000, 9_000)) == 1
+    monkeypatch.setattr(os, "cpu_count", lambda: 2)
+    assert writers_for(Path("a.%04d.png"), (640, 480)) == 2
 
 
 @pytest.mark.parametrize("threads", [1, 3])
