@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 import pytest
 import tifffile
+from scipy import ndimage
 
 from app.errors import UserError
 from app.media import files
@@ -512,3 +513,13 @@ def test_overscan_can_be_told_of_a_map_that_does_not(tmp_path: Path, ending: str
     np.testing.assert_allclose(read.values, inner.values, rtol=1e-6)
     with pytest.raises(UserError, match="--overscan 1000000 leaves nothing of its 9 x 6 pixels"):
         read_map(tmp_path / f"a{ending}", overscan=1_000_000)
+
+
+def test_the_folds_of_a_large_map_are_counted_once() -> None:
+    """It is looked at in strips, beside all of it at once."""
+    rng = np.random.default_rng(0)
+    values = 0.02 * ndimage.gaussian_filter(rng.standard_normal((700, 1100, 2)), (3, 3, 0)).astype(np.float32)
+    down, across = np.gradient(1100 * values.astype(np.float64), axis=(0, 1))
+    wanted = np.count_nonzero((1 + across[..., 0]) * (1 + down[..., 1]) <= across[..., 1] * down[..., 0])
+    assert 1000 < wanted < 0.5 * 700 * 1100
+    assert folds(values) == wanted
