@@ -53,6 +53,25 @@ picture = "field.png"
         assert {*names, "photo.png"} < set(archive.namelist())
 
 
+def test_pictures_of_one_name_from_several_folders_stay_apart(made: Project, tmp_path: Path) -> None:
+    """Of layers and of masks that were loaded."""
+    text, given = "", list[bytes]()
+    for number in range(4):
+        (tmp_path / f"{number}").mkdir()
+        write_picture(file := tmp_path / f"{number}/m.png", Picture(np.full((8, 8, 1), 60 * number, np.uint8)))
+        given.append(file.read_bytes())
+        of = '"thickness"\ntick = 0\nwhite = 1' if number > 1 else ""
+        text += f'[[{"mask" if of else "viscosity"}]]\nkind = "picture"\npicture = "../{number}/m.png"\n'
+        text += f"of = {of}\n" if of else "scale = 1\n"
+    (folder := tmp_path / "here").mkdir()
+    parsed = Recipe.parse(text)
+    recipe = made.recipe.edited(viscosity=parsed.viscosity, mask=parsed.mask)
+    projects.save(replace(made, recipe=recipe, folder=folder), tmp_path / "work.fluidwarp")
+    loaded = projects.load(tmp_path / "work.fluidwarp")
+    named = [layer.picture for layer in (*loaded.recipe.viscosity, *loaded.recipe.mask)]  # pyright: ignore[reportAttributeAccessIssue]
+    assert [(loaded.folder / name).read_bytes() for name in named] == given
+
+
 def test_a_project_holds_everything(made: Project, tmp_path: Path) -> None:
     saved = projects.save(made, tmp_path / "work.fluidwarp")
     assert (saved.path, saved.name) == (tmp_path / "work.fluidwarp", "work")

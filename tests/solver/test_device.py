@@ -96,6 +96,13 @@ def test_a_device_that_is_not_there_is_named_with_those_that_are(monkeypatch: py
 
 
 @linux
+def test_doctor_hears_how_many_devices_there_are_where_one_is_not():
+    found = limits(**{GPU: "99999"})
+    assert found["error"].startswith("graphics device 99999 is not there; there is ")
+    assert found["devices"] >= 1
+
+
+@linux
 @pytest.mark.parametrize(("asked", "wanted"), [("", None), ("0", 0), ("1", 1)])
 def test_the_environment_chooses_the_device(monkeypatch: pytest.MonkeyPatch, asked: str, wanted: int | None):
     """Each way to a context is asked for it, and none is taken that could not choose."""

@@ -21,9 +21,10 @@ from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.ui.chooser import Chosen
 from app.ui.events import Drop
+from app.ui.fitting import Fits
 from app.ui.widgets import Ui
 from app.work.export_process import FitProcess
-from app.work.fit_job import pairs_in
+from app.work.fit_job import Fit, pairs_in
 from app.work.worker import Outcome
 from solver.gl.device import Device
 from support.commands import Run
@@ -108,6 +109,17 @@ def test_a_fit_is_one_edit_that_is_played_and_the_command_line_s(robot: Robot, f
         assert [(handle.at, handle.to) for handle in fitted.handle] == [(one.at, one.to) for one in made.handle]
         if not of_pairs:  # where a search begins at the handles' own sizes, too
             assert fitted.text() == made.edited(picture=None).text()
+
+
+def test_what_is_fitted_is_the_work_that_is_open_as_the_command_line_would(robot: Robot) -> None:
+    """With as many trial runs, and by the name that the person knows."""
+    editor, session = robot.editor, robot.editor.session
+    fits = Fits(editor.workspace, editor.messages)
+    fits.start()
+    assert fits.process is not None
+    project = session.project
+    assert fits.process.fit == Fit(session.recipe, project.picture, project.folder, source=project.label)
+    fits.give_up()
 
 
 def test_stopped_it_keeps_the_best_so_far(robot: Robot, widgets: Widgets) -> None:

@@ -185,6 +185,30 @@ def test_what_is_whole_is_not_made_again(folder: Path, fluidwarp: Run):
     assert part.stderr == "fluidwarp: 2 of 2 frames were whole and are kept\n"
 
 
+@pytest.mark.parametrize(
+    "change",
+    [
+        ["--bits", "16"], ["--size", "40"], ["--filter", "bilinear"], ["--edges", "mirror"], ["--strip"],
+        ["--codec", "zips"], ["--overscan", "0"],
+    ],
+    ids=lambda change: change[0],
+)  # fmt: skip
+def test_what_was_applied_otherwise_is_applied_again(folder: Path, fluidwarp: Run, change: list[str]):
+    write_map(folder / "m.exr", Displacement(np.full((HEIGHT + 4, WIDTH + 4, 2), 0.02, np.float32), 2))
+    words = ["apply", "m.exr", "plate.%04d.exr", "-o", "w.%04d.exr"]
+    assert fluidwarp(folder, *words).returncode == 0
+    first = {name: (folder / name).read_bytes() for name in made(folder)}
+    kept = fluidwarp(folder, *words, "--resume")
+    assert (kept.returncode, kept.stderr) == (0, "fluidwarp: 4 of 4 frames were whole and are kept\n")
+    ran = fluidwarp(folder, *words, "--resume", *change)
+    assert "kept" not in ran.stderr, ran.stderr
+    if change == ["--overscan", "0"]:  # which the map's own number would not be
+        assert (ran.returncode, "same proportions" in ran.stderr) == (1, True), ran.stderr
+        return
+    assert ran.returncode == 0
+    assert all((folder / name).read_bytes() != data for name, data in first.items())
+
+
 def test_a_mask_of_the_colours_of_a_frame_is_that_frame_s(folder: Path, fluidwarp: Run):
     """Of a still too, and of what was made before that frame was another; one that there is not is told."""
     mask = '[[mask]]\nkind = "fill"\ntick = 0\nof = "frozen"\namount = 1\nsegment = {color = "#ffffff", frame = 2}\n'
