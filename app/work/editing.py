@@ -110,6 +110,7 @@ class Editing(Painting):
         self.commit(name)
         self._joined = (history.recipe, those) if joined and (goes_on or self._has_committed) else None
         if coasts:
+            self._coasts_on = True
             self._coast()
 
     def edit_held(self, name: str, label: str, commit: bool = True, **settings: Any) -> None:

@@ -149,13 +149,16 @@ class Playing(Editing):
         """Take back what was committed last, unless it had changed nothing: Undo would take what was done before it.
 
         The playhead stays where it is, or goes back to where a setting was changed: the hand goes on with that there.
-        What has been played all along, as with the amount, plays on.
+        What has been played all along, as with the amount, plays on, and fluid that has coasted coasts on.
         """
         if self._has_committed:
-            tick, plays = self.target if self._changed_at is None else self._changed_at, self.playing
+            tick = self.moment if self._changed_at is None else self._changed_at
+            plays, coasts = self.playing, self.coasting and self._coasts_on
             self.undo()
-            self.seek(tick)
+            self.seek(min(tick, self.end) if coasts else tick)
             self.playing = plays
+            if coasts:
+                self._coast()
 
     def seek(self, tick: int) -> None:
         """Send the playhead to a tick of the recording; it arrives over the next frames."""
@@ -184,11 +187,13 @@ class Playing(Editing):
         self._hold()
         ticks = self._gesture.pen if self._gesture is not None else self.tick + 1
         if self._live.ticks < ticks:
-            self._live = self._live.edited(duration=ticks * self.dt)
+            longer, is_previewed = {"duration": ticks * self.dt}, self._live is not self._base
+            self._live = self._live.edited(**longer)
             self._is_heard = False
             if self.made is None:
-                self.document.history.go_on(self._live)
-                self._base = self._live
+                # What is previewed is no part of what was done before it: it becomes an entry of its own.
+                self._base = self._base.edited(**longer) if is_previewed else self._live
+                self.document.history.go_on(self._base)
         self._step()
 
     def _look_for_rest(self) -> None:

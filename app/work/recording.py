@@ -82,6 +82,7 @@ class Recording:
         # Ticks at which what is previewed, and what was committed last, change a setting; None if they do not.
         self._changes_at: int | None = None
         self._changed_at: int | None = None
+        self._coasts_on = False  # the last commit was of an edit that let the fluid coast on
 
     @property
     def recipe(self) -> Recipe:
@@ -335,5 +336,6 @@ class Recording:
         history.commit(name, self._live)
         self._has_committed = history.recipe is not before
         self._changed_at, self._changes_at = self._changes_at, None
+        self._coasts_on = self.coasting
         self._base = self._live
         self.changes += 1

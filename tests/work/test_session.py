@@ -13,6 +13,7 @@ import pytest
 
 from app.errors import UserError
 from app.media import project as projects
+from app.media.pictures import write_picture
 from app.model import edits, toml
 from app.model.bars import Which
 from app.model.forces import VortexForce
@@ -32,7 +33,7 @@ from app.work.replay import Replay
 from app.work.session import Session
 from solver.gl.device import Device
 from solver.warp.distortion import MOST_PLACES, MapStatistics
-from support.editing import small_project
+from support.editing import pattern, small_project
 from support.gl_objects import Made
 
 TRIANGLE = {
@@ -773,6 +774,65 @@ def test_what_was_previewed_and_dropped_sends_the_playhead_nowhere_later(session
     session.retract()
     session.settle()
     assert (session.target, session.recipe.amount) == (end, 1.0)
+
+
+@pytest.mark.parametrize("ticks", [0, 3])
+def test_the_amount_is_an_edit_of_its_own_while_the_fluid_coasts(session: Session, ticks: int) -> None:
+    """It is dragged while the recording goes on, which is no part of it, as it is none of the recording."""
+    paint(session, "push", (0.4, 0.5), (0.6, 0.5))
+    before = session.document.history.index
+    session.preview(amount=0.5)
+    session.advance(1)
+    for _ in range(ticks):
+        session.advance(1)
+    session.commit("Amount")
+    session.settle()
+    assert [entry.name for entry in session.document.history.entries][before:] == ["Push", "Amount"]
+    assert session.recipe.amount == 0.5
+    session.undo()
+    assert (session.recipe.amount, len(session.recipe.stroke)) == (1.0, 1)
+    session.redo()
+    assert (session.recipe.amount, len(session.recipe.stroke)) == (0.5, 1)
+
+
+@pytest.mark.parametrize("name", ["Amount", "Repeat stroke"])
+def test_what_is_retracted_lets_the_fluid_coast_on_if_it_did_so_before(session: Session, name: str) -> None:
+    """As one click on the slider does."""
+    paint(session, "push", (0.4, 0.5), (0.6, 0.5))
+    session.advance(1)
+    before = session.recipe
+    if name == "Amount":
+        session.edit(name, amount=0.5)
+    else:
+        session.edit_bars(name, {("stroke", 0)}, lambda one: one.model_copy(update={"muted": True}))
+    session.advance(1)
+    assert session.coasting
+    session.retract()
+    assert session.coasting
+    assert (session.recipe.amount, session.recipe.stroke) == (before.amount, before.stroke)
+    session.settle()
+    assert session.end > before.recorded
+    assert not session.is_behind
+
+
+def test_what_is_retracted_behind_the_end_in_a_clip_leaves_the_playhead_there(device: Device, tmp_path: Path) -> None:
+    """A clip that is longer than the recording goes on with the last warp."""
+    for number in range(60):
+        write_picture(tmp_path / f"c.{number:04d}.png", pattern(40, 30))
+    recipe = Recipe.model_validate({"fluid": {"grid": 32}})
+    session = Session(device, projects.from_picture(tmp_path / "c.%04d.png", recipe))
+    paint(session, "push", (0.4, 0.5), (0.6, 0.5))
+    session.stop_recording()
+    session.settle()
+    assert session.length > session.end + 10
+    session.seek(session.end + 7)
+    session.settle()
+    moment = session.moment
+    session.edit("Amount", amount=0.5)
+    session.retract()
+    session.settle()
+    assert session.moment == moment
+    session.release_gpu()
 
 
 def test_a_grid_that_is_not_wanted_any_more_has_nothing_on_the_gpu(
