@@ -5,7 +5,7 @@ from __future__ import annotations
 import queue
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Generic, TypeVar
 
 from app.errors import UserError
@@ -24,12 +24,14 @@ def write_behind(write: Callable[[T], None], threads: int = 1) -> Iterator[Calla
 
     What `write` raises is raised by the next call, or when the block ends; all has been written once it has ended, well
     or with a `UserError`. What is handed over must not be changed afterwards.
+
+    However it ends, nothing is being written any more: also a Ctrl+C meanwhile waits for what has been begun.
     """
     waiting: queue.Queue[object] = queue.Queue(DEPTH)
     failed: list[BaseException] = []
     stopped = threading.Event()
 
-    def work() -> None:
+    def work(end: threading.Event) -> None:
         while (item := waiting.get()) is not _END:
             if failed or stopped.is_set():
                 continue  # the other side must not be left waiting for room
@@ -37,15 +39,18 @@ def write_behind(write: Callable[[T], None], threads: int = 1) -> Iterator[Calla
                 write(item)  # type: ignore[arg-type]
             except BaseException as error:
                 failed.append(error)
+        with suppress(queue.Full):  # of ends, which are enough for the others
+            waiting.put_nowait(_END)
+        end.set()
 
     def put(item: T) -> None:
         if failed:
             raise failed[0]
         waiting.put(item)
 
-    workers = [threading.Thread(target=work, name="writer", daemon=True) for _ in range(threads)]
-    for worker in workers:
-        worker.start()
+    ended = [threading.Event() for _ in range(threads)]
+    for end in ended:
+        threading.Thread(target=work, args=(end,), name="writer", daemon=True).start()
     try:
         yield put
     except UserError:
@@ -54,12 +59,29 @@ def write_behind(write: Callable[[T], None], threads: int = 1) -> Iterator[Calla
         stopped.set()
         raise
     finally:
-        for _ in workers:
-            waiting.put(_END)
-        for worker in workers:
-            worker.join()
+        _end(waiting, ended)
     if failed:
         raise failed[0]
+
+
+def _end(waiting: queue.Queue[object], ended: list[threading.Event]) -> None:
+    """Let the threads come to their end; a process that went before they do would leave what they are in the midst of.
+
+    A join that is interrupted takes its thread for one that has ended (CPython 3.11), and so does `is_alive` then.
+    """
+    interrupted: KeyboardInterrupt | None = None
+    is_told = False
+    while not all(one.is_set() for one in ended):
+        try:
+            if not is_told:
+                waiting.put(_END)  # each hands it on
+                is_told = True
+            for one in ended:
+                one.wait()
+        except KeyboardInterrupt as error:
+            interrupted = error
+    if interrupted is not None:
+        raise interrupted
 
 
 @contextmanager
