@@ -114,10 +114,10 @@ def test_a_fit_is_one_edit_that_is_played_and_the_command_line_s(robot: Robot, f
 def test_what_is_fitted_is_the_work_that_is_open_as_the_command_line_would(robot: Robot) -> None:
     """With as many trial runs, and by the name that the person knows."""
     editor, session = robot.editor, robot.editor.session
+    session.project = project = replace(session.project, label="the work that is open")
     fits = Fits(editor.workspace, editor.messages)
     fits.start()
     assert fits.process is not None
-    project = session.project
     assert fits.process.fit == Fit(session.recipe, project.picture, project.folder, source=project.label)
     fits.give_up()
 
