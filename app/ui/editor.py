@@ -52,7 +52,7 @@ from app.work.session import Session
 from solver.gl.device import Device
 from solver.gl.field import GraphicsMemoryError
 
-# Keys that go through a list or a menu, choose in it and close it, or would take away what lies below it.
+# Keys that with Ctrl, too, go through a list or a menu, choose in it and close it, or would take away what lies below it.
 IN_LISTS = ("enter", "space", "up", "down", "left", "right", "home", "end", "tab", "escape", "delete", "backspace")
 AWAITING = 0.02  # seconds between two looks at whether a frame of a clip has been decoded
 TOLD = 2  # frames after a click or a key that may begin or end typing, in which imgui tells whether text is typed
@@ -338,7 +338,7 @@ class Editor:
                 if down and self.dialogs.shown:
                     if key and not repeat:
                         self.dialogs.shown[-1].hear(mods.chord(key))
-                elif down and self.ui.has_popup and key in IN_LISTS:
+                elif down and self.ui.has_popup and (key in IN_LISTS or not mods.ctrl):
                     return
                 elif down and key != "space":  # which is also held to pan, so that it acts only once it is let go
                     self._key(key, mods.chord(key), repeat)

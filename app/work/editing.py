@@ -135,6 +135,7 @@ class Editing(Painting):
         self.preview(**parts)
         if lasts:
             self._send(self.end)
+            self._went_back = False
         if commit:
             self.commit(name)
             if self.target == self.end and (self.is_behind or self._is_away()):

@@ -890,7 +890,7 @@ def test_a_double_click_on_a_setting_changes_it_where_the_playhead_was(robot: Ro
     assert twice.change[0].drag == DEFAULT.drag != once.change[0].drag
 
 
-@pytest.mark.parametrize("key", ["home", "end", "space", "tab", "escape", "delete", "backspace"])
+@pytest.mark.parametrize("key", ["home", "end", "space", "tab", "escape", "delete", "backspace", "t", "[", "4"])
 def test_keys_of_an_open_list_are_its_own(robot: Robot, widgets: Widgets, key: str) -> None:
     only(robot)
     robot.drag((0.3, 0.3), (0.5, 0.5), steps=4)
@@ -903,10 +903,16 @@ def test_keys_of_an_open_list_are_its_own(robot: Robot, widgets: Widgets, key: s
     widgets.look()
     robot.click(*widgets.at["##symmetry"].middle)
     robot.frame(count=2)
-    before = session.recipe, session.target, session.playing, state.selected, state.inspector
+
+    def now() -> tuple[Any, ...]:
+        brush, shown = asdict(state.brush), [overlay.shown for overlay in state.overlays.values()]
+        where = session.target, session.playing, state.selected, state.inspector, state.tool_name
+        return session.recipe, where, brush, shown
+
+    before = now()
     robot.key(key)
     robot.frame(count=3)
-    assert (session.recipe, session.target, session.playing, state.selected, state.inspector) == before
+    assert now() == before
 
 
 def test_a_key_that_chooses_in_an_open_list_does_nothing_else(robot: Robot, widgets: Widgets) -> None:
