@@ -52,7 +52,7 @@ from app.work.session import Session
 from solver.gl.device import Device
 from solver.gl.field import GraphicsMemoryError
 
-# Keys that with Ctrl, too, go through a list or a menu, choose in it and close it, or would take away what lies below it.
+# Keys that, with Ctrl too, go through a list or a menu, choose in it and close it, or would take away what lies below.
 IN_LISTS = ("enter", "space", "up", "down", "left", "right", "home", "end", "tab", "escape", "delete", "backspace")
 AWAITING = 0.02  # seconds between two looks at whether a frame of a clip has been decoded
 TOLD = 2  # frames after a click or a key that may begin or end typing, in which imgui tells whether text is typed

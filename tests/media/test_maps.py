@@ -519,7 +519,10 @@ def test_the_folds_of_a_large_map_are_counted_once() -> None:
     """It is looked at in strips, beside all of it at once."""
     rng = np.random.default_rng(0)
     values = 0.02 * ndimage.gaussian_filter(rng.standard_normal((700, 1100, 2)), (3, 3, 0)).astype(np.float32)
-    down, across = np.gradient(1100 * values.astype(np.float64), axis=(0, 1))
-    wanted = np.count_nonzero((1 + across[..., 0]) * (1 + down[..., 1]) <= across[..., 1] * down[..., 0])
+    (down_x, down_y), (across_x, across_y) = (
+        [np.asarray(np.gradient(1100 * values[..., part].astype(np.float64), axis=axis)) for part in (0, 1)]
+        for axis in (0, 1)
+    )
+    wanted = np.count_nonzero((1 + across_x) * (1 + down_y) <= across_y * down_x)
     assert 1000 < wanted < 0.5 * 700 * 1100
     assert folds(values) == wanted

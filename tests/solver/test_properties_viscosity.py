@@ -13,7 +13,7 @@ from solver.fluid import Fluid
 from solver.gl.device import Device
 from solver.grid import Grid
 from solver.limits import LARGEST_VISCOSITY, LONGEST_STEP
-from solver.params import FluidParams, Walls
+from solver.params import FluidParams, NoSlip, Walls
 from solver.viscosity.deflation import CoarseSpace
 from solver.viscosity.operator import Coefficients
 from solver.viscosity.parts import BROAD, find_parts
@@ -101,7 +101,7 @@ def test_the_mean_motions_of_parts_are_those_that_moved_them() -> None:
     is_open = np.ones_like(stiff)
     parts = find_parts(stiff, np.where(stiff, 1e5, 1.0), is_open, is_open, 32)
     assert (parts.cores, parts.runs_of_u > 0, parts.count > 2 + parts.runs_of_u) == (2, True, True)
-    level = Coefficients.uniform(1e5, (28, 24), (14, 12), (1.0, 1.0), (False,) * 4)
+    level = Coefficients.uniform(1e5, (28, 24), (14, 12), (1.0, 1.0), NoSlip(False, False, False, False, False))
     space = CoarseSpace(parts, level, 0.0, (0, 0))
     unknowns = rng.standard_normal(len(space.part))
     across, down, turn = space.motions(unknowns).T
