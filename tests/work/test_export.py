@@ -6,8 +6,6 @@ import json
 import os
 import re
 import subprocess
-import threading
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
@@ -20,7 +18,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from app.errors import Cancelled, UserError
+from app.errors import UserError
 from app.gallery.measures import sharpness, spline_warp
 from app.media import ffmpeg
 from app.media.auxiliary import Pictures
@@ -40,7 +38,6 @@ from app.work.apply_job import Application, MapSource, converted, inverted
 from app.work.export import Target, displacement, looked_up, run, shown_positions, writers_for
 from app.work.jobs import Job, MapOutput, Outputs
 from app.work.replay import Replay
-from app.work.threads import prefetch, write_behind
 from solver.gl.device import Device
 from solver.resample.plan import GivenMap, Sampling
 from solver.resample.sampler import Sampler
@@ -573,33 +570,6 @@ def test_what_is_opaque_stays_so(device: Device, tmp_path: Path):
     assert (read_picture(tmp_path / "out.exr").pixels[:, -10:, 3] == 0).all()
 
 
-# Two ends of a stream -----------------------------------------------------------------------------------------------
-
-
-def test_what_is_handed_over_arrives_in_order():
-    came: list[int] = []
-    with write_behind(came.append) as put:
-        for number in range(100):
-            put(number)
-    assert came == list(range(100))
-    with prefetch(iter(range(100))) as items:
-        assert list(items) == list(range(100))
-
-
-def test_several_threads_write_at_a_time_and_all_is_written():
-    """Each waits until another one writes, too: one thread alone would wait in vain."""
-    together, came = threading.Barrier(2), list[int]()
-
-    def write(number: int) -> None:
-        together.wait(timeout=60)
-        came.append(number)
-
-    with write_behind(write, threads=2) as put:
-        for number in range(10):
-            put(number)
-    assert sorted(came) == list(range(10))
-
-
 def test_several_threads_write_sequences_alone_and_no_more_than_fits_in_memory(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(os, "cpu_count", lambda: 16)
     assert writers_for(Path("a.mp4"), (640, 480)) == 1
@@ -608,62 +578,6 @@ def test_several_threads_write_sequences_alone_and_no_more_than_fits_in_memory(m
     assert writers_for(Path("a.%04d.png"), (12_000, 9_000)) == 1
     monkeypatch.setattr(os, "cpu_count", lambda: 2)
     assert writers_for(Path("a.%04d.png"), (640, 480)) == 2
-
-
-@pytest.mark.parametrize("threads", [1, 3])
-def test_what_several_threads_cannot_write_is_heard(threads: int):
-    def write(number: int) -> None:
-        if number == 5:
-            raise UserError("the disk is full")
-
-    with pytest.raises(UserError, match="disk is full"), write_behind(write, threads) as put:
-        all(put(number) is None for number in range(1000))
-    assert not [one for one in threading.enumerate() if one.name == "writer"]
-
-
-def test_what_was_handed_over_before_a_fault_is_written():
-    came: list[int] = []
-
-    def slow(number: int) -> None:
-        time.sleep(0.05)
-        came.append(number)
-
-    def hand_over() -> None:
-        with write_behind(slow) as put:
-            put(0)
-            put(1)
-            raise UserError("the next cannot be read")
-
-    with pytest.raises(UserError, match="the next"):
-        hand_over()
-    assert came == [0, 1]
-
-
-def test_what_goes_wrong_at_one_end_is_heard_at_the_other():
-    def refuse(number: int) -> None:
-        if number == 3:
-            raise Cancelled
-
-    def broken():
-        yield 1
-        raise UserError("the clip ends here")
-
-    with pytest.raises(Cancelled), write_behind(refuse) as put:
-        all(put(number) is None for number in range(1000))
-    with pytest.raises(UserError, match="ends here"), prefetch(broken()) as items:
-        list(items)
-    closed: list[bool] = []
-
-    def endless():
-        try:
-            while True:
-                yield 0
-        finally:
-            closed.append(True)
-
-    with prefetch(endless()) as items:
-        next(items)
-    assert closed == [True]
 
 
 def test_one_place_a_pixel_is_as_sharp_as_a_spline(device: Device, tmp_path: Path) -> None:
