@@ -37,9 +37,9 @@ TOLERANCE = 0.008
 TOLERANCE_MODERATE = 0.012
 TOLERANCE_STIFF = 0.07
 # On a grid of at most so many cells an iteration costs next to nothing, and the errors of all steps add up to more of a
-# cell. There the tolerance is a third, and with one viscosity a ninth. A moderate mask of 27 x 27 cells with walls was
-# .22 cells off its turned set-up after 60 steps that moved 12, and is .06; one viscosity on 25 x 33 was .020, and is
-# .001.
+# cell. There the tolerance is a ninth. Moderate masks with walls on up to 40 x 40 cells were up to .22 cells off their
+# turned set-up after 60 steps that moved 12; with a third still .13, now .08. One viscosity on 25 x 33 was .020 off, and
+# is .001.
 SMALL = 64 * 64
 # With one viscosity a cycle leaves at most this fraction of the energy of any error: .72^2. By power iteration on 40 x
 # 31 and 97 x 130 cells it is .40^2 (kappa .5) to .67^2 (100) between free-slip walls, .34^2 to .72^2 between no-slip
@@ -107,12 +107,12 @@ def plan_for(least: float, largest: float, cells: int, is_one: bool, has_edges: 
 
     `is_one`: there is only one viscosity, and nothing solid. `has_edges`: of stiff parts, see `is_sharp`.
     """
-    share, of_one = (1.0, 1.0) if cells > SMALL else (1.0 / 3.0, 1.0 / 9.0)
+    share = 1.0 if cells > SMALL else 1.0 / 9.0
     count = sweeps_alone(largest, share * TOLERANCE / (16.0 * max(largest, 1e-30)))
     if count <= MOST_SWEEPS:
         return Plan("smooth", count)
     if is_one:
-        return Plan("cg", 2, of_one * TOLERANCE, cycle_leaves=UNIFORM_CYCLE_LEAVES)
+        return Plan("cg", 2, share * TOLERANCE, cycle_leaves=UNIFORM_CYCLE_LEAVES)
     varies = largest > MODERATE * least
     # Below `MODERATE` only masks with solids are sharp.
     rigid = has_edges and (varies or (least > ONE_SWEEP and largest > RIGID_OF_SOFTEST * least))
