@@ -38,8 +38,8 @@ TOLERANCE_MODERATE = 0.012
 TOLERANCE_STIFF = 0.07
 # On a grid of at most so many cells an iteration costs next to nothing, and the errors of all steps add up to more of a
 # cell. There the tolerance is a ninth. Moderate masks with walls on up to 40 x 40 cells were up to .22 cells off their
-# turned set-up after 60 steps that moved 12; with a third still .13, now .08. One viscosity on 25 x 33 was .020 off, and
-# is .001.
+# turned set-up after 60 steps that moved 12; with a third still .13, now .08. One viscosity on 25 x 33 was .020 off,
+# and is .001.
 SMALL = 64 * 64
 # With one viscosity a cycle leaves at most this fraction of the energy of any error: .72^2. By power iteration on 40 x
 # 31 and 97 x 130 cells it is .40^2 (kappa .5) to .67^2 (100) between free-slip walls, .34^2 to .72^2 between no-slip
