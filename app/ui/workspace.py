@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import ctypes
-import os
 from dataclasses import dataclass, field
-from functools import cache, partial
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,6 +13,7 @@ from app.media.reel import Reel
 from app.model.picture import Picture
 from app.ui.canvas import Canvas, shown_pixels
 from app.ui.journals import Journals
+from app.ui.memory import hand_back, map_large_blocks
 from app.ui.viewport import Viewport
 from app.work.recovery import Found
 from app.work.session import Session
@@ -111,6 +110,7 @@ class Workspace:
         self._works: list[Work] = []
         self._left: list[Canvas] = []  # whose pictures the frame that is being drawn may still hold
         self._index = -1
+        map_large_blocks()
 
     @property
     def session(self) -> Session:
@@ -223,7 +223,7 @@ class Workspace:
             for canvas in self._left:
                 canvas.release()
             self._left.clear()
-            _hand_back()
+            hand_back()
 
     def _put_to_sleep(self, work: Work) -> None:
         if (canvas := work.sleep()) is not None:
@@ -247,19 +247,3 @@ class Workspace:
     def _close(self, work: Work) -> None:
         self._journals.close(work.session)
         self._put_to_sleep(work)
-
-
-def _hand_back() -> None:
-    """Let the system have the memory that has been freed.
-
-    glibc keeps what lies below anything that is still in use: of the checkpoints that a software rasteriser has in
-    memory, up to 400 MB a work, nearly all.
-    """
-    if (trim := _malloc_trim()) is not None:
-        trim(0)
-
-
-@cache
-def _malloc_trim() -> ctypes._NamedFuncPointer | None:
-    """That of the C library of this process; None where it has none, as only glibc does."""
-    return getattr(ctypes.CDLL(None), "malloc_trim", None) if os.name == "posix" else None

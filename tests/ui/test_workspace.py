@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 import platform
+import subprocess
+import sys
 from pathlib import Path
 from threading import Event, Thread
 from threading import enumerate as enumerate_threads
@@ -161,3 +164,29 @@ def test_the_system_has_what_left_works_had(robot: Robot, tmp_path: Path) -> Non
     robot.frame()
     assert len(pins) == 40
     assert resident() < before - 64 * 2**20  # of 118; the new work takes some
+
+
+# Blocks as large as tiles of the map, and in between what stays; said is what the system had back of them.
+FREEING = """
+import numpy as np
+from app.ui.screenshots import OffscreenEditor
+from solver.gl.device import Device
+from support.resources import resident
+editor = OffscreenEditor(Device.headless())
+larger = np.ones(2**24, np.uint8)
+del larger
+made = [(np.ones(2**19, np.uint8), bytes(4000)) for _ in range(200)]
+pins = [pin for _, pin in made]
+before = resident()
+del made
+print(before - resident())
+"""
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="only glibc can be asked")
+def test_large_blocks_are_the_systems_once_they_are_freed() -> None:
+    """In a process of its own, whose heap nobody else has left gaps in."""
+    path = os.pathsep.join([str(Path(__file__).parents[1]), *filter(None, sys.path)])
+    done = subprocess.run([sys.executable, "-c", FREEING], env={**os.environ, "PYTHONPATH": path}, capture_output=True)
+    assert done.returncode == 0, done.stderr.decode()
+    assert int(done.stdout) > 80 * 2**20  # of 100
