@@ -30,8 +30,8 @@ from solver.warp.scaled import ScaledMap
 
 KEEP_EVERY = 4  # ticks between checkpoints of what is recorded, for scrubbing
 # Bytes of texture memory for checkpoints: with a map of 12,000 x 9,000 pixels and with what OpenGL keeps for itself,
-# the editor takes less than 1.5 GB beyond the picture.
-BUDGET = 320 * 2**20
+# the editor takes less than 1.4 GB beyond the picture and its file.
+BUDGET = 256 * 2**20
 REST = 0.004  # longer sides a second: a pixel of a screen in four frames
 RETURN = 0.08  # seconds of the frame in which another state of the history is asked for
 
