@@ -188,6 +188,31 @@ def test_a_keyframe_does_not_keep_a_turn_from_being_changed_while_it_is_made(rob
     assert session.recipe.handle[0].turned == ()
 
 
+@pytest.mark.parametrize("label", ["Rotate", "Scale"])
+@pytest.mark.parametrize("turned", [(), ((0.1, 0.0, 1.0), (0.9, 30.0, 2.0))])
+def test_a_double_click_on_what_was_never_turned_is_no_edit(
+    robot: Robot, widgets: Widgets, label: str, turned: tuple[tuple[float, float, float], ...]
+) -> None:
+    """A turn of 0 and a size of 1 were recorded, with which it no more turns as the fluid does; or a keyframe."""
+    session = robot.editor.session
+    handle = RecipeHandle(at=(0.4, 0.5), to=(0.45, 0.5), duration=0.1, turned=turned)
+    session.edit("Handle", handle=(handle,), duration=1.0)
+    session.seek(10)
+    robot.editor.state.selected = "handle[1]"
+    robot.rest()
+    before = session.document.history.index
+    for part in (0.5, 0.8):  # where the first click changes nothing, or next to nothing, and where it does
+        widgets.look()
+        robot.frame(dt=1.0)  # or it would be a click more of those before
+        rect = widgets.at[label]
+        for _ in range(2):
+            robot.click(rect.x + part * rect.width, rect.middle[1])
+        robot.frame(count=2)
+        robot.rest()
+        assert session.recipe.handle == (handle,)
+        assert session.document.history.index == before
+
+
 def test_the_last_keyframe_is_removed_from_a_handle_that_only_turns(robot: Robot, widgets: Widgets) -> None:
     """What was saved then could not be opened any more: a handle without `to` or keys."""
     session = robot.editor.session

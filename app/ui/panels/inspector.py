@@ -226,11 +226,9 @@ def _turn(ui: Ui, session: Session, label: str, led: RecipeHandle) -> None:
     slid = ui.slider(
         "held rotate", "Rotate", rotate, -180.0, 180.0, DEGREES, 0.0, title="Rotate", more=f"Clockwise. {when}"
     )
-    turned = _turned(led.turned_to(tick, dt, slid.value, scale)) if led.turned else {"rotate": slid.value}
-    _set_held(session, label, f"Turn of a {led.kind}", slid, **turned)
+    _set_turn(session, label, led, f"Turn of a {led.kind}", slid, rotate=slid.value)
     slid = ui.slider("held scale", "Scale", scale, 0.25, 4.0, PERCENT, 1.0, logarithmic=True, title="Scale", more=when)
-    turned = _turned(led.turned_to(tick, dt, rotate, slid.value)) if led.turned else {"scale": slid.value}
-    _set_held(session, label, f"Scale of a {led.kind}", slid, **turned)
+    _set_turn(session, label, led, f"Scale of a {led.kind}", slid, scale=slid.value)
     keyed = led.turned_to(tick, dt, rotate, scale)
     is_key = keyed.turned == led.turned
     if ui.button("Remove this keyframe" if is_key else "Add a keyframe here", width=-1, height=30):
@@ -241,8 +239,23 @@ def _turn(ui: Ui, session: Session, label: str, led: RecipeHandle) -> None:
     ui.tooltip(f"A keyframe of Rotate and Scale {where}", more=more)
 
 
-def _turned(led: RecipeHandle) -> dict[str, Any]:
-    return {"rotate": led.rotate, "scale": led.scale, "turned": led.turned}
+def _set_turn(session: Session, label: str, led: RecipeHandle, name: str, slid: Slid, **setting: float) -> None:
+    """Set how far a handle is turned, or its size; what is set to the value that it has stays as it was.
+
+    A handle that was never turned goes with the fluid, and one that is turned by 0 does not; nor is a keyframe added.
+    """
+    if slid.again:
+        session.retract()
+    if not (slid.changed or slid.done):
+        return
+    tick, dt, saved = session.target, session.dt, session.document.recipe
+    before = dict(labelled(saved.handle, saved.pin)).get(label)
+    led = before if isinstance(before, RecipeHandle) else led  # without what the slider has previewed
+    _, rotate, scale = led.turn_key(tick, dt)
+    turn = {"rotate": rotate, "scale": scale} | setting
+    if turn != {"rotate": rotate, "scale": scale}:
+        led = led.turned_to(tick, dt, **turn) if led.turned else led.model_copy(update=setting)
+    session.edit_held(name, label, slid.done, rotate=led.rotate, scale=led.scale, turned=led.turned)
 
 
 def whereabouts(workspace: Workspace, label: str, led: RecipeHandle | RecipePin) -> str:
