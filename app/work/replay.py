@@ -32,7 +32,7 @@ from solver.brush.handles import Begun, Handles
 from solver.brush.masks import Masks
 from solver.fluid import Fluid
 from solver.gl.device import Device
-from solver.gl.field import Field
+from solver.gl.field import Field, FieldError
 from solver.grid import SMALLEST_GRID, Grid
 from solver.paper import PaperFluid, PaperWarpMap
 from solver.params import FluidParams, Walls
@@ -284,6 +284,8 @@ class Replay:
             for act in acts:
                 try:
                     painted |= brushwork.draw(scene, act.stroke, act.tick, act.dabs)
+                except FieldError:  # a fault of the program's and of no stroke: it names the field
+                    raise
                 except ValueError as error:  # of a speed, to which the length of a tick belongs
                     name, mend = f"stroke[{self.recipe.stroke.index(act.stroke) + 1}]", "let it take more ticks"
                     raise UserError(
@@ -303,6 +305,8 @@ class Replay:
         pushes, motions = acting(self.forces, self.fluid, self.tick * dt, dt, self)
         try:
             self.fluid.step(dt, pushes, steer if brushwork.is_leading or leads else None)
+        except FieldError:
+            raise
         except ValueError as error:  # of numbers that no key is alone in: many at once, each within its own bounds
             mend = "make their strength less, or let fewer of them act at once"
             raise UserError(f"At {self.tick * dt:.6g} s {error}; {mend}") from None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import re
 from collections.abc import Iterator
 from fractions import Fraction
 
@@ -19,6 +20,7 @@ from app.work.replay import Replay
 from solver import energy
 from solver.fluid import Fluid
 from solver.gl.device import Device
+from solver.gl.field import FieldError
 from solver.grid import Grid
 from solver.resample.sampler import Sampler
 
@@ -66,6 +68,18 @@ def replay(device: Device) -> Iterator[Replay]:
     replay = Replay(device, RECIPE, pictures())
     yield replay
     replay.release()
+
+
+def test_a_fault_of_a_field_is_not_told_as_that_of_what_acts(replay: Replay) -> None:
+    """It read "stroke[1]: at 0.075 s impulse was released; let it take more ticks", as of a speed."""
+    replay.seek(3)
+    for field in (replay.fluid.impulse.field, replay.forces[0].faces):
+        assert field is not None
+        field.release()
+        with pytest.raises(FieldError, match=f"^{re.escape(field.label)} was released$"):
+            replay.advance()
+        replay.seek(0)
+        replay.use(RECIPE.edited(stroke=()))
 
 
 def moment(replay: Replay) -> bytes:
