@@ -20,6 +20,7 @@ from app.media.opening import Opened, open_recipe
 from app.media.project import frame_numbers, picture_names
 from app.media.source import CLIP_ENDINGS
 from app.model.recipe import Recipe
+from app.model.windows import on_grid
 from app.progress import Progress
 from app.work.export import Report, run
 from app.work.jobs import Job, Outputs
@@ -57,11 +58,16 @@ class Edits:
 
     def applied(self, recipe: Recipe) -> Recipe:
         """The recipe with them. Raises `UserError` where they are no values for it."""
-        parts = dict(self.keys)
+        parts, cells = dict(self.keys), None
         for name, table in self.tables:
-            parts[name] = getattr(recipe, name).model_copy(update=dict(table))
+            keys = dict(table)
+            cells = keys.pop("grid", None) if name == "fluid" else cells
+            parts[name] = getattr(recipe, name).model_copy(update=keys)
+        edited = recipe.edited(**parts)
+        if cells is not None:
+            edited = on_grid(edited, cells)  # as the editor goes to another grid
         try:
-            return recipe.edited(**parts).checked(COMMAND_LINE) if parts else recipe
+            return edited.checked(COMMAND_LINE) if parts else recipe
         except UserError as error:
             said = str(error).removeprefix(f"{COMMAND_LINE}: ")
             for key, flag in FLAGS.items():

@@ -31,6 +31,7 @@ from app.work.handle_status import FIT
 from app.work.jobs import Job, MapOutput, Outputs
 from app.work.replay import Replay
 from app.work.session import Session
+from app.work.tasks import Edits, Task
 from solver.gl.device import Device
 from solver.warp.distortion import MOST_PLACES, MapStatistics
 from support.editing import pattern, small_project
@@ -315,6 +316,30 @@ def test_settings_before_the_first_stroke_are_the_recipe_s_own(session: Session)
         session.change("Change", **settings)
         assert [change.tick for change in session.recipe.change] == [tick]
         assert session.recipe.fluid == own
+
+
+def test_the_command_line_goes_to_another_grid_as_the_editor_does(
+    session: Session, device: Device, tmp_path: Path
+) -> None:
+    """It had all on the coarse cells, where the editor gives a brush that is small on them a window."""
+    session.begin_with(viscosity=1.0, drag=12.0, grid=128)
+    stroke = Stroke(tool="push", radius=0.1, samples=((0, 0.4, 0.5, 1), (3, 0.5, 0.5, 1)))
+    session.edit("Push", stroke=(stroke,), duration=0.15)
+    project = tmp_path / "a.fluidwarp"
+    projects.save(replace(session.project, recipe=session.recipe), project)
+    asked = Task(
+        picture=None,
+        outputs=Outputs(tmp_path / "asked.png"),
+        recipe=str(project),
+        edits=Edits.of({"fluid": {"grid": 48}}, {}),
+    )
+    session.set_grid(48)
+    assert session.recipe.stroke[0].detail
+    chosen = Outputs(tmp_path / "chosen.png")
+    run(device, Job(session.recipe, session.project.picture, session.project.folder, chosen), Progress())
+    asked.perform(lambda: device, Progress())
+    found = [(tmp_path / name).read_bytes() for name in ("asked.png", "chosen.png")]
+    assert found[0] == found[1]
 
 
 def test_another_grid_replays_everything(session: Session) -> None:
