@@ -380,10 +380,15 @@ def _perform(piece: Piece, given: list[Path], jobs: int, cluster: str | None, gp
             _perform_many(pieces, jobs, cluster, verbose)
         return
     piece = piece.named()
-    states = no_empty_folder(piece.outputs.states)
-    with states, ExitStack() as stack, on_terminal(piece.outputs.files[0].name, None) as progress:
+    states, told = no_empty_folder(piece.outputs.states), list[str]()
+
+    def warn(said: str) -> None:
+        told.append(said)
+        _tell(said)
+
+    with states, ExitStack() as stack, on_terminal(piece.outputs.files[0].name, None, warn=warn) as progress:
         report = piece.perform(lambda: stack.enter_context(Device.headless()), progress)
-    _tell(*report.notices, *([report.verdict] if report.verdict else []))
+    _tell(*(said for said in report.notices if said not in told), *([report.verdict] if report.verdict else []))
 
 
 def _choose(gpu: int | None) -> None:

@@ -30,6 +30,7 @@ class Progress:
     """Counts the steps of a job; `report(done, total)` hears of each, `cancel()` answers whether to stop.
 
     `tell(state)` hears what is being done: "writing" and the like, where a step takes long; "" is the work itself.
+    `warn(said)` hears of what the user may want to stop it for; it is among the notices of the work too.
     The window passes its own callbacks; the command line uses `on_terminal`.
     """
 
@@ -39,12 +40,14 @@ class Progress:
         report: Callable[[int, int | None], None] = lambda done, total: None,
         cancel: Callable[[], bool] = never,
         tell: Callable[[str], None] = lambda state: None,
+        warn: Callable[[str], None] = lambda said: None,
     ) -> None:
         self._total = total
         self.done = 0
         self.cancel = cancel
         self._report = report
         self._tell = tell
+        self.warn = warn
 
     @property
     def total(self) -> int | None:
@@ -207,14 +210,20 @@ def deaf_children() -> Iterator[None]:
 
 
 @contextmanager
-def on_terminal(description: str, total: int | None, at_once: Callable[[], None] | None = leave) -> Iterator[Progress]:
+def on_terminal(
+    description: str,
+    total: int | None,
+    at_once: Callable[[], None] | None = leave,
+    warn: Callable[[str], None] = lambda said: None,
+) -> Iterator[Progress]:
     """A `Progress` drawn as a bar with the time left on stderr, silent when that is no terminal; Ctrl+C cancels.
 
     at_once: see `interruptible`.
+    warn: see `Progress`.
     """
     with interruptible(at_once) as cancel:
         if not sys.stderr.isatty():
-            yield Progress(total, cancel=cancel)
+            yield Progress(total, cancel=cancel, warn=warn)
             return
         from rich.console import Console
         from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
@@ -230,4 +239,4 @@ def on_terminal(description: str, total: int | None, at_once: Callable[[], None]
             def tell(state: str) -> None:
                 bars.update(task, description=f"{description}: {state}" if state else description)
 
-            yield Progress(total, report, cancel, tell)
+            yield Progress(total, report, cancel, tell, warn)

@@ -1070,6 +1070,13 @@ def test_a_clip_that_is_cut_during_the_job_is_a_failure_with_its_own_status(
     assert here(folder) == {"a.toml", "cat.png", "in.mkv"}
 
 
+@pytest.mark.parametrize("where", ["x.png", "out/"])
+def test_a_grid_far_finer_than_the_picture_is_told_once(fluidwarp: Run, folder: Path, where: str) -> None:
+    ran = fluidwarp(folder, "render", "a.toml", "cat.png", "-o", where, "--grid", "400", "--duration", "0.02")
+    assert ran.returncode == 0
+    assert ran.stderr.count("a grid of 400 cells is 6.25 times as fine") == len(ran.stderr.splitlines()) == 1
+
+
 @pytest.mark.parametrize("words", [["render", "a.toml"], ["apply", "m.npy", "cat.png"]])
 def test_a_result_of_more_pixels_than_are_read_is_refused(fluidwarp: Run, folder: Path, words: list[str]) -> None:
     ran = fluidwarp(folder, *words, "-o", "x.png", "--size", "32768")

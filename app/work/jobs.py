@@ -24,6 +24,7 @@ from app.media.opening import check_picture
 from app.media.pictures import write_picture
 from app.model.picture import Picture
 from app.model.recipe import UNNAMED, Recipe
+from solver.grid import SMALLEST_GRID
 
 
 @dataclass(frozen=True)
@@ -157,6 +158,10 @@ class Outputs:
         return replace(self, file=file, stats=stats, maps=maps, states=states)
 
 
+# Cells a pixel, and cells along the longer side, up to which no grid is too fine: the window offers so many.
+TOO_FINE, USUAL_GRID = 4, 384
+
+
 @dataclass(frozen=True)
 class Job:
     """What is made of what.
@@ -205,6 +210,16 @@ class Job:
     def rate(self) -> Fraction:
         """Frames per second."""
         return rate_of(self.clip, self.recipe.output.fps)
+
+    @property
+    def too_fine(self) -> str:
+        """That its grid is far finer than the picture, which takes far longer, in a sentence; "" if it is not."""
+        width, height = self.picture.width, self.picture.height
+        cells, pixels = self.recipe.fluid.grid, max(width, height)
+        if cells <= max(USUAL_GRID, TOO_FINE * pixels):
+            return ""
+        finer = f"{cells / pixels:.3g} times as fine as the picture of {width} x {height} pixels"
+        return f"a grid of {cells} cells is {finer}, and takes long; one of {max(pixels, SMALLEST_GRID)} is as fine"
 
     def check(self) -> None:
         """Find out before the work what would keep it from being written.
