@@ -230,15 +230,19 @@ class _Export:
         wanted = shown[moment(first) : None if last is None else moment(last) + 1]
         self.progress.expect(ceil(max(wanted, default=shown[-1])) - end)
         count = len(range(clip.frames or len(shown))[first - start : until]) if clip else len(wanted)
-        self.progress.expect(count * (passes(file) if file is not None else 1))
         records = self._records()
+        passed, threads, writer = 1, 0, None
+        if file is not None:
+            passed, threads = passes(file), writers_for(file, self.size)
+            writer = self._writer(file, first, records)
+        self.progress.expect(count * passed)
         with ExitStack() as stack:
             take_map = None
             if maps is not None and maps.is_sequence:
                 cancel, note = self.progress.cancel, noting(records, maps.path, self.whole[maps.path])
-                writer = map_writer(maps.path, maps.kind, cancel=cancel, written=note, resumed=self.outputs.resume)
-                threads = writers_for(maps.path, self._map_size(maps))
-                take_map = stack.enter_context(numbered_behind(stack.enter_context(writer), threads))
+                maker = map_writer(maps.path, maps.kind, cancel=cancel, written=note, resumed=self.outputs.resume)
+                makers = writers_for(maps.path, self._map_size(maps))
+                take_map = stack.enter_context(numbered_behind(stack.enter_context(maker), makers))
             kept = Kept(records.values() if self.outputs.resume else [])
             if clip is not None:
                 if not clip.is_whole:
@@ -252,11 +256,7 @@ class _Export:
                 self._look(job.picture)
                 missing = [(number, position) for number, position in enumerate(wanted, first) if not kept(number)]
                 frames = self._frames_of_picture(missing, take_map)
-            if file is None:
-                written = write_all(frames, None, 0, self.progress)
-            else:
-                threads = writers_for(file, self.size)
-                written = write_all(frames, self._writer(first, records), threads, self.progress)
+            written = write_all(frames, writer, threads, self.progress)
             self.progress.expect(-kept.count)
             if said := kept.said(written):
                 self.pictures.notice(said)
@@ -311,9 +311,8 @@ class _Export:
             return frame
         return mixed(frame, next(frames), into.share, premultiplied=self.like.premultiplied)
 
-    def _writer(self, first: int, records: dict[Path, Record]) -> AbstractContextManager[FrameWriter]:
-        job, file = self.job, self.outputs.file
-        assert file is not None
+    def _writer(self, file: Path, first: int, records: dict[Path, Record]) -> AbstractContextManager[FrameWriter]:
+        job = self.job
         return animation_writer(
             file,
             job.rate,
