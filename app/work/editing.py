@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import replace
 from math import ceil
 from typing import Any
 
@@ -108,9 +109,9 @@ class Editing(Painting):
         if goes_on:
             history.amend(recipe)
         self.commit(name)
-        self._joined = (history.recipe, those) if joined and (goes_on or self._has_committed) else None
+        self._joined = (history.recipe, those) if joined and (goes_on or self._last) else None
         if coasts:
-            self._coasts_on = True
+            self._last = self._last and replace(self._last, coasts_on=True)
             self._coast()
 
     def edit_held(self, name: str, label: str, commit: bool = True, **settings: Any) -> None:

@@ -151,9 +151,9 @@ class Playing(Editing):
         The playhead stays where it is, or goes back to where a setting was changed: the hand goes on with that there.
         What has been played all along, as with the amount, plays on, and fluid that has coasted coasts on.
         """
-        if self._has_committed:
-            tick = self.moment if self._changed_at is None else self._changed_at
-            plays, coasts = self.playing, self.coasting and self._coasts_on
+        if (last := self._last) is not None:
+            tick = self.moment if last.changed_at is None else last.changed_at
+            plays, coasts = self.playing, self.coasting and last.coasts_on
             self.undo()
             self.seek(min(tick, self.end) if coasts else tick)
             self.playing = plays

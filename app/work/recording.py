@@ -8,6 +8,7 @@ knows a window, and the clock comes in from outside, as ticks. This one is long,
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass
 from fractions import Fraction
 from math import ceil
 
@@ -34,6 +35,19 @@ KEEP_EVERY = 4  # ticks between checkpoints of what is recorded, for scrubbing
 BUDGET = 256 * 2**20
 REST = 0.004  # longer sides a second: a pixel of a screen in four frames
 RETURN = 0.08  # seconds of the frame in which another state of the history is asked for
+
+
+@dataclass(frozen=True)
+class Committed:
+    """An edit that was made an entry of the history.
+
+    Attributes:
+        changed_at: the tick at which it changes a setting; None if it changes none.
+        coasts_on: it let the fluid coast on.
+    """
+
+    changed_at: int | None
+    coasts_on: bool
 
 
 class Recording:
@@ -78,11 +92,8 @@ class Recording:
         # Ticks from the recording's end to the playhead: a clip that is longer goes on with the last warp.
         self._beyond = 0
         self._coasted = 0
-        self._has_committed = False  # the last commit was an edit, and not of nothing
-        # Ticks at which what is previewed, and what was committed last, change a setting; None if they do not.
-        self._changes_at: int | None = None
-        self._changed_at: int | None = None
-        self._coasts_on = False  # the last commit was of an edit that let the fluid coast on
+        self._last: Committed | None = None  # unless the last commit was of nothing, or another state is shown since
+        self._changes_at: int | None = None  # the tick at which what is previewed changes a setting
 
     @property
     def recipe(self) -> Recipe:
@@ -321,7 +332,8 @@ class Recording:
     def _show(self, recipe: Recipe) -> None:
         """Another state of the work, with the playhead at its end."""
         moment = self.moment
-        self.playing = self.coasting = self._went_back = self._has_committed = False
+        self.playing = self.coasting = self._went_back = False
+        self._last = None
         self.replay.checkpoint()
         self._base = recipe
         self._use(recipe)
@@ -334,8 +346,7 @@ class Recording:
         history = self.document.history
         before = history.recipe
         history.commit(name, self._live)
-        self._has_committed = history.recipe is not before
-        self._changed_at, self._changes_at = self._changes_at, None
-        self._coasts_on = self.coasting
+        self._last = Committed(self._changes_at, self.coasting) if history.recipe is not before else None
+        self._changes_at = None
         self._base = self._live
         self.changes += 1
