@@ -209,6 +209,42 @@ def test_what_was_applied_otherwise_is_applied_again(folder: Path, fluidwarp: Ru
     assert all((folder / name).read_bytes() != data for name, data in first.items())
 
 
+@pytest.mark.parametrize(
+    ("command", "picture", "name", "ways"),
+    [
+        ("render a.toml", "plate.1001.exr", "w.%d.exr", ["--bits 16", "--strip", "--codec zips", "--amount 0.5"]),
+        ("render a.toml", "p.png", "w.%d.jpg", ["--quality 20", "dense.png", "other.png"]),
+        ("render a.toml", "p.png", "m.%d.exr", ["--offsets", "--forward", "--overscan 2", "--map-size 24"]),
+        ("apply given.%d.exr", "p.png", "w.%d.jpg", ["--quality 20", "dense.png", "--kind offsets", "--grid corners"]),
+    ],
+    ids=["frames", "jpegs", "maps", "applied"],
+)
+def test_what_was_made_otherwise_is_made_again(
+    folder: Path, fluidwarp: Run, command: str, picture: str, name: str, ways: list[str]
+):
+    """After each option that changes the files, they are as if there had been none; and with it again they are kept."""
+    pixels = (plate(1) * 255).astype(np.uint8)
+    y, x = np.mgrid[0:HEIGHT, 0:WIDTH]
+    places = np.stack([(x + 0.5) / WIDTH + 0.05, 1 - (y + 0.5) / HEIGHT, 0 * x], axis=-1).astype(np.float32)
+    pictures = {
+        "p.png": Picture(pixels), "dense.png": Picture(pixels, dpi=(300, 300)), "other.png": Picture(pixels[::-1]),
+        "given.1.exr": Picture(places),
+    }  # fmt: skip
+    for place, given in pictures.items():
+        write_picture(folder / place, given)
+    (folder / "new").mkdir()
+    file, other = (folder / place / name.replace("%d", "1") for place in (".", "new"))
+    usual = [*command.split(), "--frames", "1", "-o" if name.startswith("w") else "--map"]
+    for way in ways:
+        words = [picture, *way.split()] if way.startswith("-") else [way]
+        assert fluidwarp(folder, *usual, name, picture).returncode == 0
+        first = file.read_bytes()
+        said = [fluidwarp(folder, *usual, name, "--resume", *words).stderr for _ in range(2)]
+        assert ["kept" in text for text in said] == [False, True], (way, said)
+        assert fluidwarp(folder, *usual, f"new/{name}", *words).returncode == 0
+        assert file.read_bytes() == other.read_bytes() != first, way
+
+
 def test_a_mask_of_the_colours_of_a_frame_is_that_frame_s(folder: Path, fluidwarp: Run):
     """Of a still too, and of what was made before that frame was another; one that there is not is told."""
     mask = '[[mask]]\nkind = "fill"\ntick = 0\nof = "frozen"\namount = 1\nsegment = {color = "#ffffff", frame = 2}\n'
