@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from app.errors import UserError
+from app.media import project as projects
 from app.media.auxiliary import Pictures
 from app.media.clip import CHANGED, has_changed
 from app.media.displacement import Displacement
@@ -17,6 +18,7 @@ from app.media.inputs import check_size
 from app.media.landmarks import read_pairs
 from app.media.maps import write_map
 from app.media.numbered import check_numbers
+from app.media.pictures import write_picture
 from app.media.project import named_in
 from app.model.picture import Picture
 from app.model.recipe import Output, Playback, Recipe
@@ -37,6 +39,12 @@ def named_by_a_recipe(folder: Path) -> None:
         check_size(Path("big.png"), 9, 8, 71)
 
 
+def inside_of_a_project(folder: Path) -> None:
+    write_picture(folder / "p.png", PICTURE)
+    projects.save(projects.from_picture(folder / "p.png", Recipe()), folder / "w.fluidwarp")
+    projects.load(folder / "w.fluidwarp", max_pixels=71)
+
+
 def beside_others(folder: Path) -> None:
     with telling([Path("a.png"), Path("m.npy")]):
         raise has_changed(Path("a.mp4"), 900, 90)
@@ -55,11 +63,17 @@ def one_set(folder: Path) -> None:
 LATE = "the animation ends at 1 s, and cannot begin at 2 s"
 GAP = "Cannot read f.%d.png: of 1-4 it lacks the frame 3; make them, or "
 TOO_MANY = "Cannot read big.png, which r.toml names: 9 x 8 pixels are more than the limit of 71; "
+INSIDE = "Cannot read p.png in w.fluidwarp: 32 x 24 pixels are more than the limit of 71; "
 WAYS: dict[str, tuple[Callable[[Path], None], str, str]] = {
     "a picture of another's": (
         named_by_a_recipe,
         TOO_MANY + "if you trust the file, raise it with --max-pixels 72.",
         TOO_MANY + "make it smaller first.",
+    ),
+    "a picture of a project": (
+        inside_of_a_project,
+        INSIDE + "if you trust the file, raise it with --max-pixels 768.",
+        INSIDE + "make it smaller first.",
     ),
     "a clip, beside others": (
         beside_others,

@@ -227,7 +227,10 @@ def _read(path: Path, archive: Archive, max_pixels: int) -> Project:
     try:
         source = open_source(file, max_pixels)
     except UserError as error:  # the temporary folder is nobody's business
-        raise UserError(str(error).replace(shown(str(file)), f"{recipe.picture} in {path}")) from None
+        told, in_window = (
+            said.replace(shown(str(file)), f"{recipe.picture} in {path}") for said in (str(error), error.in_window)
+        )
+        raise UserError(told, error.status, in_window) from None
     return Project(recipe, source.picture, data, folder, path, keeper=keeper, clip=source.clip, label=str(path))
 
 

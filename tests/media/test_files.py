@@ -14,6 +14,7 @@ import pytest
 
 from app.errors import UserError
 from app.media.files import cannot_write, check_kept, name_from, replacing, takes_place
+from app.media.inputs import state_of
 
 
 def test_a_picture_is_named_by_the_way_to_it_and_on_another_drive_by_all_of_its_path(
@@ -39,6 +40,25 @@ def test_a_picture_is_named_by_the_way_to_it_and_on_another_drive_by_all_of_its_
 )
 def test_what_takes_the_place_of_what(output: str, source: str, does: bool) -> None:
     assert takes_place(output, source) is does
+
+
+@pytest.mark.parametrize("change", ["another file", "its size", "its time"])
+def test_a_file_is_told_from_what_stands_in_its_place_later_by_any_of_these_alone(tmp_path: Path, change: str) -> None:
+    file, other = tmp_path / "a", tmp_path / "b"
+    for path in (file, other):
+        path.write_bytes(b"123")
+        os.utime(path, ns=(7, 7))
+    before = state_of(file)
+    assert before is not None
+    assert state_of(file) == before
+    if change == "another file":
+        other.replace(file)
+    elif change == "its size":
+        file.write_bytes(b"1234")
+    os.utime(file, ns=(7, 8 if change == "its time" else 7))
+    assert state_of(file) not in (None, before)
+    file.unlink()
+    assert state_of(file) is None
 
 
 def test_a_result_is_not_written_over_its_source(tmp_path: Path) -> None:

@@ -15,11 +15,12 @@ import pytest
 
 from app.errors import UserError
 from app.media import project as projects
+from app.media.inputs import state_of
 from app.media.opening import open_recipe
 from app.media.pictures import write_picture
 from app.media.project import Project, picture_names
 from app.model.picture import Picture
-from app.model.recipe import Recipe
+from app.model.recipe import UNNAMED, Recipe
 from app.model.strokes import Stroke
 
 
@@ -83,6 +84,24 @@ def test_a_project_holds_everything(made: Project, tmp_path: Path) -> None:
     assert loaded.data == original
     again = projects.save(loaded, tmp_path / "again.fluidwarp")
     assert projects.load(tmp_path / "again.fluidwarp").recipe == again.recipe
+
+
+def test_every_way_to_a_project_tells_where_it_is_from(made: Project, tmp_path: Path) -> None:
+    file, recipe, photo = tmp_path / "work.fluidwarp", tmp_path / "r.toml", tmp_path / "photo.png"
+    recipe.write_text('picture = "photo.png"\nduration = 1\n')
+
+    def told(project: Project) -> tuple[object, ...]:
+        return project.label, project.path, project.seen, project.embedded, project.folder, project.keeper is None
+
+    for embedded in (True, False):
+        saved, seen = projects.save(made, file, embedded=embedded), state_of(file)
+        assert told(saved) == (UNNAMED, file, seen, embedded, tmp_path, True)
+        found = projects.load(file)
+        folder = found.folder if embedded else tmp_path
+        assert told(found) == (str(file), file, seen, embedded, folder, not embedded)
+        assert (folder == tmp_path) != embedded
+    assert told(projects.from_recipe(recipe)) == (str(recipe), None, None, True, tmp_path, True)
+    assert told(projects.from_picture(photo, Recipe())) == (UNNAMED, None, None, True, tmp_path, True)
 
 
 def test_a_project_can_refer_to_its_picture(made: Project, tmp_path: Path) -> None:

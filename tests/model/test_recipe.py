@@ -396,6 +396,26 @@ def test_a_stroke_is_passed_piece_by_piece():
     assert stroke.at(5) == ()
 
 
+@pytest.mark.parametrize(
+    ("handle", "fits"),
+    [
+        ("", True),
+        ("muted = true", False),
+        ("end = 0.95", False),
+        ("end = 1.0", True),
+        ("end = 0.95\nmuted = true", False),
+        ("keys = []", False),
+    ],
+)
+def test_a_handle_can_be_fitted_that_is_led_and_held_to_the_end(handle: str, fits: bool):
+    led = "" if handle.startswith("keys") else "to = [0.6, 0.5]\n"
+    text = f"fluid = {{ dt = 0.05 }}\n[[handle]]\nat = [0.4, 0.5]\n{led}{handle}\n"
+    assert Recipe.parse(text).can_fit == fits
+    others = "[[handle]]\nat = [0.7, 0.5]\nto = [0.6, 0.5]\nmuted = true\n"
+    assert Recipe.parse(text + others).can_fit == fits
+    assert Recipe.parse(text + others.replace("muted = true", "")).can_fit
+
+
 def test_what_is_cut_off_at_a_tick_is_what_was_passed_before_it():
     stroke = push((2, 0.0, 0.0, 1.0), (4, 0.2, 0.2, 1.0), (6, 0.3, 0.2, 0.0))
     for tick in (3, 4, 5, 6):

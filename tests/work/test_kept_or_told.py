@@ -774,6 +774,25 @@ def test_what_a_clip_has_is_kept_or_told(tmp_path: Path, fluidwarp: Run) -> None
     assert told("clear.webm", "b.mov") == told("clear.webm", "b.%d.png") == ""
 
 
+@pytest.mark.parametrize("words", [["render", "still.toml"], ["apply", "m.npy"]], ids=lambda words: words[0])
+def test_what_is_lost_depends_on_the_codec_and_the_depth_that_are_asked_for(
+    tmp_path: Path, fluidwarp: Run, words: list[str]
+) -> None:
+    (tmp_path / "still.toml").write_text(RECIPE)
+    write_map(tmp_path / "m.npy", Displacement(np.zeros((HEIGHT, WIDTH, 2), np.float32)))
+    for number in (1, 2):
+        write_picture(tmp_path / f"p.{number}.png", Picture(with_alpha(smooth()).astype(np.uint16) * 257))
+    black, eight = "no alpha, and is laid over black", "holds 8 bits a channel"
+    cases: dict[str, list[str]] = {
+        "-o a.mov": [], "-o b.mov --codec prores-422-hq": [black], "-o c.%d.png": [], "-o d.%d.png --bits 8": [eight],
+        "-o e.%d.jpg": [black, eight],
+    }  # fmt: skip
+    for way, lost in cases.items():
+        ran = fluidwarp(tmp_path, *words, "p.%d.png", *way.split())
+        assert ran.returncode == 0, ran.stderr
+        assert [said for said in (black, eight) if said in ran.stderr] == lost, (way, ran.stderr)
+
+
 @pytest.mark.parametrize("words", [["render", "still.toml"], ["apply", "m.npy"]])
 def test_what_belongs_to_an_animated_picture_is_kept_or_told(tmp_path: Path, fluidwarp: Run, words: list[str]) -> None:
     (tmp_path / "still.toml").write_text(RECIPE)

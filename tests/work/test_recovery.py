@@ -7,12 +7,14 @@ import gc
 import os
 import random
 import shutil
+import struct
 import subprocess
 import sys
 import tempfile
 import threading
 import time
 import weakref
+import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from datetime import date
@@ -602,6 +604,20 @@ def test_what_is_told_of_a_damaged_project_is_in_whole_sentences(tmp_path: Path)
     desk.die()
     path.write_bytes(b"no project")
     with pytest.raises(UserError, match=r"get it again\. The work on “work” is kept; put the file back"):
+        found_in(desk.root).load()
+
+
+def test_a_picture_that_is_too_large_by_now_is_told_as_in_a_window(desk: Desk, tmp_path: Path) -> None:
+    """Which has no --max-pixels."""
+    desk.push()
+    desk.die()
+    data = bytearray((tmp_path / "pattern.png").read_bytes())
+    data[16:24] = struct.pack(">II", 30000, 30000)
+    data[29:33] = struct.pack(">I", zlib.crc32(data[12:29]))
+    (tmp_path / "pattern.png").write_bytes(data)
+    with pytest.raises(
+        UserError, match=r"30000 x 30000 pixels .* make it smaller first\. The work on “pattern” is kept;"
+    ):
         found_in(desk.root).load()
 
 
