@@ -17,7 +17,14 @@ from pydantic_core import PydanticUndefined
 from app.model.recipe import Recipe
 
 GOLDEN = Path(__file__).parents[1] / "golden" / "recipe.txt"
-BOUNDS = {"gt": "above", "ge": "from", "lt": "below", "le": "to", "min_length": "of at least"}
+BOUNDS = {
+    "gt": "above",
+    "ge": "from",
+    "lt": "below",
+    "le": "to",
+    "min_length": "of at least",
+    "max_length": "of at most",
+}
 
 
 def bounds_of(field: FieldInfo) -> list[str]:

@@ -427,6 +427,27 @@ def test_what_is_cut_off_at_a_tick_is_what_was_passed_before_it():
     assert stroke.before(7) is stroke
 
 
+def test_of_each_list_what_is_done_before_a_tick_is_left_and_of_a_mask_what_is_done_at_it():
+    """And all else of a recipe stays, but for how long it is."""
+    text = 'name = "a"\nmap = "m.npy"\namount = 0.5\nfluid = { dt = 0.05, grid = 99 }\nstop = { energy_below = 1 }\n'
+    text += '[[force]]\nkind = "point"\npoint = [0.5, 0.5]\ndirection = [1, 0]\n'
+    text += '[[viscosity]]\nkind = "constant"\nscale = 2\n[[freeze]]\nkind = "constant"\n'
+    begins = {"stroke": "", "handle": "", "pin": "", "change": "", "mask": ""}
+    for tick in (2, 3, 4):
+        begins["stroke"] += f'[[stroke]]\ntool = "push"\nsamples = [[{tick}, 0.1, 0.1, 1], [{tick + 1}, 0.2, 0.1, 1]]\n'
+        begins["handle"] += f"[[handle]]\nat = [0.5, 0.5]\nto = [0.5, 0.6]\nstart = {tick * 0.05}\nend = 9\n"
+        begins["pin"] += f"[[pin]]\nat = [0.5, 0.5]\nstart = {tick * 0.05}\n"
+        begins["change"] += f"[[change]]\ntick = {tick}\ndrag = {tick}\n"
+        begins["mask"] += f'[[mask]]\nkind = "clear"\nof = "frozen"\ntick = {tick}\n'
+    whole = Recipe.parse(text + "".join(begins.values()))
+    cut = cut_off(whole, 3)
+    assert {key: len(getattr(cut, key)) for key in begins} == dict.fromkeys(begins, 1) | {"mask": 2}
+    assert (cut.change, cut.mask, cut.pin) == (whole.change[:1], whole.mask[:2], whole.pin[:1])
+    assert cut.duration == pytest.approx(0.15)
+    others = {key for key in Recipe.model_fields if key not in begins} - {"duration"}
+    assert {key for key in others if getattr(cut, key) != getattr(whole, key)} == set()
+
+
 def test_what_a_reset_lets_go_of_is_held_again_where_the_reset_is_cut_off():
     """Who went back before the reset and painted lost the handles when the time of the reset had come."""
     text = "duration = 2.0\nhandle = [{at = [0.4, 0.5], keys = [[0.1, 0.5, 0.5]]}]\n"

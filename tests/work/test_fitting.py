@@ -22,10 +22,11 @@ from app.media.source import open_source
 from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.progress import INTERRUPTED, Progress
-from app.work import fitting
+from app.work import fitting, worker
 from app.work.fit_job import Fit, FitJob
 from app.work.fitting import LEAST_DET, Fitted, Trial, fitted
 from app.work.replay import Replay
+from app.work.worker import Outcome, perform
 from solver.gl.device import Device
 from solver.warp.inverse import ForwardMap
 from support.commands import Run
@@ -206,6 +207,26 @@ def test_a_fit_ends_where_the_recipe_s_own_stop_ends_it(device: Device):
     missed, stopped = found.notices
     assert "pixels from where they should be" in missed
     assert re.match(r"stopped at t = 0\.\d+ s \(tick \d+\): largest displacement", stopped)
+
+
+def test_all_that_a_fit_has_found_is_handed_on(device: Device, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(worker, "own_device", lambda: device)
+    coarse = FREE.replace("grid = 32\ndt = 0.04", "grid = 12\ndt = 0.08")
+    recipe = Recipe.parse(coarse + "[stop]\ndisplacement_above = 0.02\n")
+    order = Fit(recipe, PICTURE, Path(), Pairs.points(PAIRS[:1]), 12)
+
+    def progress() -> Progress:
+        made = [0]
+        return Progress(report=lambda done, total: made.append(done), cancel=lambda: max(made) >= 9)
+
+    found = order.perform(device, progress())
+    assert (found.is_met, found.stopped, len(found.notices)) == (False, True, 2)
+    told = perform(order, progress())
+    assert told.recipe is not None
+    assert told.recipe.text() == found.trial.recipe.text()
+    assert replace(told, recipe=None) == Outcome(
+        "the fit", notices=found.notices, verdict=found.told, is_met=False, stopped=True
+    )
 
 
 def test_what_is_fitted_anew_is_waited_for_as_before(device: Device):
