@@ -626,6 +626,23 @@ def test_states_of_another_driver_or_version_of_it_are_not_taken(
             replay.release()
 
 
+def test_a_state_that_stands_under_another_simulation_s_name_is_not_taken(device: Device, folder: Path):
+    told, files = list[str](), list[Path]()
+    for strength in (5, 4, 4):
+        recipe = Recipe.parse(RECIPE.replace("strength = 5", f"strength = {strength}"))
+        replay = Replay(device, recipe, Pictures(read_picture(folder / "p0.png")), budget=0)
+        kept = states.StoredStates(folder / "states", replay, told.append)
+        if len(files) < 2:
+            replay.seek(2)
+            kept.keep(last=True)
+            files += [path for path in (folder / "states").iterdir() if path not in files]
+        else:
+            files[1].write_bytes(files[0].read_bytes())
+            assert not kept.resume(2)
+        replay.release()
+    assert told == [f"{files[1]} is damaged (it is of another simulation) and is made anew"]
+
+
 def test_a_state_is_kept_every_64_ticks_and_at_the_end(device: Device, folder: Path):
     still = Recipe.parse("duration = 10\nfluid = { grid = 8 }\n")
     replay = Replay(device, still, Pictures(read_picture(folder / "p0.png")), budget=0)
