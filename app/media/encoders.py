@@ -249,8 +249,12 @@ def check_animation(
     fps: float | Fraction = 1,
     codec: str | None = None,
     size: tuple[int, int] | None = None,
+    bits: int | None = None,
 ) -> None:
-    """Raise `UserError` if `animation_writer` has no format for `path`, or not this frame rate, codec or size."""
+    """Raise `UserError` if `animation_writer` has no format for `path`, or not this frame rate, codec or size.
+
+    bits: a channel, of the pictures of a sequence; a video has its own.
+    """
     if not 0 < fps <= 1000:
         raise UserError(f"Cannot write {path}: a frame rate of {float(fps):g} is not between 0 and 1000.")
     if is_sequence(path):
@@ -260,7 +264,7 @@ def check_animation(
         if suffix in ANIMATIONS and suffix not in FORMATS:
             mend = f"end in one of {' '.join(FORMATS)}, or leave out the number for one {suffix}"
             raise UserError(f"Cannot write {path}: a sequence's files are pictures; {mend}.")
-        check_picture_output(path, size=size, codec=codec)
+        check_picture_output(path, bits, size, codec)
         return
     suffix = Path(path).suffix.lower()
     if suffix not in ANIMATIONS:
@@ -402,7 +406,7 @@ def check_output(
     The format must have the codec, the bits a channel and room for the size, (width, height) in pixels, that are given.
     """
     if animated or is_animation(path):
-        check_animation(path, fps, codec, size)
+        check_animation(path, fps, codec, size, bits)
         return
     if Path(path).suffix.lower() not in FORMATS:
         writable(path)  # of a folder or a device it is not the name's ending that is told

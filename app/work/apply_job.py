@@ -119,7 +119,8 @@ class Application(Piece):
         check_result(self._size(source.picture), source.picture)
         self.make_folder()
         writable(self._output)
-        check_output(self._output, animated=self.outputs.animated, size=self._size(source.picture))
+        size = self._size(source.picture)
+        check_output(self._output, animated=self.outputs.animated, codec=self.outputs.codec, size=size)
         if source.clip is not None:
             check_colours(self._output, self.outputs.codec, source.clip, self.outputs.is_animation)
         check_colours_of_picture(self._output, self.outputs.codec, source.picture, self.outputs.is_animation)

@@ -14,7 +14,7 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
-from dataclasses import replace
+from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -30,8 +30,9 @@ from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.progress import INTERRUPTED, Progress
 from app.work import cluster, states, worker
+from app.work.apply_job import Application, MapSource
 from app.work.batch import run_batch
-from app.work.jobs import Outputs
+from app.work.jobs import MapOutput, Outputs
 from app.work.replay import Replay
 from app.work.tasks import Edits, Task, spread
 from app.work.worker import Outcome, perform
@@ -115,6 +116,36 @@ def test_names_of_the_results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     (one,) = spread(pattern, [Path("x/e.png")])
     assert (one.outputs.file, one.outputs.stats) == (tmp_path / "e new.tif", tmp_path / "e.json")
     assert one.picture == Path("x/e.png").absolute()
+
+
+def paths_in(value: object) -> list[Path]:
+    if is_dataclass(value):
+        return [path for field in fields(value) for path in paths_in(getattr(value, field.name))]
+    return [value] if isinstance(value, Path) else []
+
+
+def test_what_a_process_elsewhere_is_given_depends_on_no_present_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    maps = MapOutput(Path("{name}.npy"), kind="offsets", forward=True, overscan=2, size=9)
+    outputs = Outputs(Path("out"), Path("{name}.json"), maps, states=Path("states"), bits=16, strip=True)
+    given = MapSource(Path("m.npy"), "offsets", "corners", 3, 99)
+    for piece in (
+        replace(order("coffee", None, outputs), max_pixels=99),
+        Application(maps=given, outputs=outputs, picture=None, edges="wrap", size=9, quality=7, fps=5, max_pixels=99),
+    ):
+        (found,) = spread(piece, [Path("in/a.png")])
+        made = [Path("in/a.png"), Path("out/a.png"), Path("a.json"), Path("a.npy"), Path("states"), Path("out")]
+        assert set(paths_in(found)) == {tmp_path / path for path in (*made, *paths_in(getattr(piece, "maps", None)))}
+        back = replace(
+            found, picture=None, folder=None, outputs=outputs,
+            **({"maps": replace(found.maps, path=given.path)} if isinstance(found, Application) else {}),
+        )  # fmt: skip
+        assert back == piece
+        there = replace(outputs, file=found.outputs.file, stats=found.outputs.stats, states=found.outputs.states)
+        assert found.outputs.maps is not None
+        assert found.outputs == replace(there, maps=replace(maps, path=found.outputs.maps.path))
 
 
 @pytest.mark.parametrize(

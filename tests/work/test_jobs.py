@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +12,14 @@ import numpy as np
 import pytest
 
 from app.errors import UserError
+from app.media.clip import USUAL, Colours
+from app.media.displacement import Displacement
+from app.media.maps import write_map
+from app.media.pictures import write_picture
+from app.media.video import Video
 from app.model.picture import Picture
 from app.model.recipe import Output, Playback, Recipe
+from app.progress import Progress
 from app.work import jobs
 from app.work.apply_job import Application, MapSource
 from app.work.jobs import Job, MapOutput, Outputs, longer_side, result_size
@@ -23,6 +30,13 @@ PICTURE = Picture(np.zeros((60, 100, 3), np.uint8))
 def job(folder: Path, recipe: Recipe | None = None, **outputs: Any) -> Job:
     given: dict[str, Any] = {name: folder / path if isinstance(path, str) else path for name, path in outputs.items()}
     return Job(recipe or Recipe(), PICTURE, folder, Outputs(given.pop("file", None), **given))
+
+
+def clip_of(folder: Path) -> Video:
+    return Video(
+        path=folder / "in.mov", width=100, height=60, bits=8, alpha=False, pixel_format="yuv420p", fps=Fraction(10),
+        decoder=(), filters="", file_size=1, inode=(1, 1), written=1,
+    )  # fmt: skip
 
 
 def test_a_size_keeps_its_proportions_and_at_least_a_pixel() -> None:
@@ -127,6 +141,70 @@ def test_all_that_is_asked_of_an_animation_is_told_to_its_writer(tmp_path: Path)
         found = Outputs(tmp_path / "a.mov", strip=strip).animation(3, Fraction(25), None, like, None)
         assert found.like is not None
         assert found.like.texts == kept
+
+
+def test_all_that_a_clip_has_is_told_to_the_writer_of_an_animation(tmp_path: Path) -> None:
+    colours, like = (
+        Colours("bt2020", "smpte2084", "bt2020nc"),
+        replace(PICTURE, chunks={b"cICP": bytes((12, 13, 0, 1))}),
+    )
+    clip = replace(
+        clip_of(tmp_path), start=1, sounds=("aac",), late=0.25, durations=(1, 2, 3, 4, 5, 6), loops=7,
+        timecode="01:00:00:07", colours=colours,
+    )  # fmt: skip
+    outputs = Outputs(tmp_path / "a.mov", bits=10, codec="prores-4444", resume=True, part=(3, 4))
+    alone = outputs.animation(3, Fraction(10), 70, like, None)
+    assert alone.colours == Colours("smpte432", "bt709", "bt709")
+    told = outputs.animation(3, Fraction(10), 70, like, clip)
+    assert told == replace(
+        alone, loops=7, durations=[4, 5], sound=clip.path, sound_from=0.45, colours=colours, timecode="01:00:00:09"
+    )
+    plain = replace(clip, sounds=(), colours=USUAL, durations=None)
+    assert outputs.animation(3, Fraction(10), 70, like, plain) == replace(
+        told, durations=None, sound=None, colours=alone.colours
+    )
+
+
+@pytest.mark.parametrize("durations", [None, (1, 2), (3, 2)])
+def test_the_frames_of_a_clip_that_stand_longer_come_less_often(tmp_path: Path, durations: tuple[int, ...]) -> None:
+    clip = replace(clip_of(tmp_path), fps=Fraction(90), durations=durations)
+    one = replace(job(tmp_path, file="a.gif"), clip=clip)
+    if durations == (3, 2):
+        one.check()
+    else:
+        with pytest.raises(UserError, match="GIF shows at most 50 frames a second"):
+            one.check()
+
+
+@pytest.mark.parametrize("is_applied", [False, True], ids=["rendered", "applied"])
+@pytest.mark.parametrize(
+    ("file", "outputs", "more", "said"),
+    [
+        ("a.mp4", {"codec": "ffv1"}, {}, "holds h264 or h265, not ffv1"),
+        ("a.%d.exr", {"codec": "h264"}, {}, "OpenEXR is compressed as .*, not h264"),
+        ("a.%d.png", {"bits": 32}, {}, "PNG holds 8 or 16 bits a channel, not 32"),
+        ("a.gif", {}, {"fps": 60}, "GIF shows at most 50 frames a second"),
+        ("a.mp4", {}, {"size": 17_000}, "17000 x 10200 pixels, and h264 holds no more than 16384 x 16384"),
+        ("a.mp4", {"codec": "h265"}, {"size": 9000}, "9000 x 5400 pixels, and h265 holds no more than 8192 x 8192"),
+        ("a.webp", {}, {"size": 17_000}, "WebP holds no side longer than 16383"),
+        ("a.webp", {"animated": True}, {"size": 17_000}, "webp holds no more than 16383 x 16383"),
+    ],
+    ids=str,
+)
+def test_what_a_file_cannot_hold_is_refused_before_the_work(
+    tmp_path: Path, file: str, outputs: dict[str, Any], more: dict[str, Any], said: str, is_applied: bool
+) -> None:
+    how = Outputs(tmp_path / file, **outputs)
+    write_picture(tmp_path / "in.png", PICTURE)
+    write_map(tmp_path / "map.npy", Displacement(np.zeros((60, 100, 2), np.float32)))
+    if is_applied:
+        order = Application(maps=MapSource(tmp_path / "map.npy"), outputs=how, picture=tmp_path / "in.png", **more)
+        check = partial(order.perform, lambda: pytest.fail("the work has begun"), Progress())
+        check = check if "size" in more else order.check  # without a look at the picture
+    else:
+        check = Job(Recipe(output=Output(**more)), PICTURE, tmp_path, how).check
+    with pytest.raises(UserError, match=said):
+        check()
 
 
 @pytest.mark.parametrize(
