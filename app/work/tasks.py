@@ -258,7 +258,7 @@ def named(path: Path, picture: Path) -> Path:
     numbers = stands_for_files(picture)
     whole = not numbers or Path(path).suffix.lower() in FORMATS
     found = Path(str(path).replace(NAME, picture.stem if whole else unnumbered(picture)))
-    if found != path and is_sequence(found) and not (numbers or is_sequence(path)):
+    if is_sequence(found) and not (numbers or is_sequence(path)):
         name = picture.name
         raise UserError(f"a result named after {name} would be a sequence of numbered files; rename {name}")
     return found

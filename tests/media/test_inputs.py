@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import json
 import os
@@ -24,7 +25,7 @@ from PIL import Image
 
 from app.errors import MOST_SHOWN, UserError, printable, shown
 from app.media.codecs.decoding import decoding
-from app.media.inputs import open_input, read_input
+from app.media.inputs import cannot_read, open_input, read_input
 from app.media.maps import holds, read_map
 from app.media.pictures import read_picture, write_picture
 from app.media.project import is_project, load
@@ -592,6 +593,11 @@ def test_what_cannot_be_opened_is_told_with_the_mend(tmp_path: Path):
         with pytest.raises(UserError) as error:
             read_picture(path)
         assert str(error.value) == f"Cannot read {path}: {said}"
+
+
+def test_a_file_that_is_there_is_no_address_whatever_it_is_called() -> None:
+    said = str(cannot_read("http://example.org/a.png", OSError(errno.EACCES, "")))
+    assert said == "Cannot read http://example.org/a.png: no permission to read it; change its permissions."
 
 
 def test_files_are_of_a_bounded_size(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

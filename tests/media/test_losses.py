@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from app.media.clip import USUAL, Colours, uncoded
 from app.media.losses import counted, lost, not_kept, unusual_colours
 
 
@@ -30,6 +31,34 @@ from app.media.losses import counted, lost, not_kept, unusual_colours
 )
 def test_colours_are_called_as_people_do(primaries: int, transfer: int, said: str) -> None:
     assert unusual_colours(primaries, transfer) == said
+
+
+@pytest.mark.parametrize(
+    ("codes", "colours"),
+    [
+        ((1, 13), USUAL),
+        ((2, 2), USUAL),
+        ((1, 6), USUAL),
+        ((6, 1), None),
+        ((5, 13), None),
+        ((9, 1), Colours("bt2020", "bt709", "bt2020nc")),
+        ((9, 16), Colours("bt2020", "smpte2084", "bt2020nc")),
+        ((9, 18), Colours("bt2020", "arib-std-b67", "bt2020nc")),
+        ((11, 14), Colours("smpte431", "bt709", "bt709")),
+        ((12, 13), Colours("smpte432", "bt709", "bt709")),
+        ((12, 16), Colours("smpte432", "smpte2084", "bt709")),
+        ((1, 16), Colours("bt709", "smpte2084", "bt709")),
+        ((1, 8), None),
+        ((9, 8), None),
+        ((16, 13), None),
+        ((12, 9), None),
+    ],
+)
+def test_what_a_picture_tells_of_its_colours_a_clip_is_given_or_nothing(
+    codes: tuple[int, int], colours: Colours | None
+) -> None:
+    assert uncoded({b"cICP": bytes((*codes, 0, 1)), b"gAMA": b"1234"}) == colours
+    assert uncoded({b"gAMA": b"1234"}) == USUAL
 
 
 def test_parts_of_a_file_are_counted_and_the_first_four_named() -> None:

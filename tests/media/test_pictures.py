@@ -1047,6 +1047,8 @@ def test_of_a_png_no_more_chunks_are_looked_at_than_a_bound(tmp_path: Path, monk
         at, count = at + 12 + int.from_bytes(data[at : at + 4], "big"), count + 1
     monkeypatch.setattr(png, "MOST_CHUNKS", count)
     assert read_picture(tmp_path / "a.png").width
+    (tmp_path / "longer.png").write_bytes(data + bytes(1000))  # what is behind its end is no chunk
+    assert read_picture(tmp_path / "longer.png").width
     monkeypatch.setattr(png, "MOST_CHUNKS", count - 1)
     with pytest.raises(UserError, match=rf"a\.png: it has more than {count - 1} chunks; save it anew"):
         read_picture(tmp_path / "a.png")

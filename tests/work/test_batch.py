@@ -34,7 +34,7 @@ from app.work.apply_job import Application, MapSource
 from app.work.batch import run_batch
 from app.work.jobs import MapOutput, Outputs
 from app.work.replay import Replay
-from app.work.tasks import Edits, Task, spread
+from app.work.tasks import Edits, Task, named, spread
 from app.work.worker import Outcome, perform
 from solver.gl.context import NoSuchDevice
 from solver.gl.device import Device
@@ -116,6 +116,30 @@ def test_names_of_the_results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     (one,) = spread(pattern, [Path("x/e.png")])
     assert (one.outputs.file, one.outputs.stats) == (tmp_path / "e new.tif", tmp_path / "e.json")
     assert one.picture == Path("x/e.png").absolute()
+
+
+@pytest.mark.parametrize(
+    ("pattern", "picture", "name"),
+    [
+        ("{name}.png", "cat.jpg", "cat.png"),
+        ("{name}.%04d.png", "cat.jpg", "cat.%04d.png"),
+        ("{name}.png", "cat.%d.jpg", "cat.%d.png"),
+        ("{name}.mp4", "cat.%d.jpg", "cat.mp4"),
+        ("{name}.png", "one%d.jpg", None),
+        ("{name}.mp4", "one%d.jpg", None),
+        ("out.png", "one%d.jpg", "out.png"),
+        ("f.%d.png", "one%d.jpg", "f.%d.png"),
+    ],
+)
+def test_only_of_a_sequence_or_where_it_is_asked_for_files_are_numbered(
+    tmp_path: Path, pattern: str, picture: str, name: str | None
+) -> None:
+    (tmp_path / "one%d.jpg").touch()  # which is a file of that name, and stands for no others
+    if name is None:
+        with pytest.raises(UserError, match=r"named after one%d\.jpg would be a sequence of numbered files"):
+            named(tmp_path / pattern, tmp_path / picture)
+    else:
+        assert named(tmp_path / pattern, tmp_path / picture) == tmp_path / name
 
 
 def paths_in(value: object) -> list[Path]:
