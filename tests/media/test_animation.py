@@ -1094,6 +1094,26 @@ def test_a_clip_that_is_written_anew_in_its_place_has_changed(tmp_path: Path):
     assert raised.value.status == 65
 
 
+@pytest.mark.parametrize("change", ["nothing", "another file", "its size", "its time"])
+def test_a_clip_is_read_only_as_it_was_when_it_was_opened(tmp_path: Path, change: str):
+    """Each by itself: of the others nothing could be seen."""
+    path, other = (
+        generate(tmp_path / name, "testsrc=s=32x24:r=10:d=0.2", "-c:v", "ffv1") for name in ("a.mkv", "b.mkv")
+    )
+    clip = read_clip(path)
+    if change == "another file":
+        other.write_bytes(path.read_bytes())
+        other.replace(path)
+    elif change == "its size":
+        path.write_bytes(path.read_bytes() + b"0")
+    os.utime(path, ns=(clip.written, clip.written + (change == "its time")))
+    if change == "nothing":
+        assert len(list(clip.read_frames())) == 2
+    else:
+        with pytest.raises(UserError, match=r"a\.mkv: it changed while it was read"):
+            list(clip.read_frames())
+
+
 def test_a_clip_that_was_cut_before_is_read_and_told(tmp_path: Path):
     """By what ffmpeg complains of, or else by the length that the file tells."""
     said: list[str] = []
