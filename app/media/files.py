@@ -8,7 +8,7 @@ import shutil
 import stat
 import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from itertools import product
 from pathlib import Path
@@ -36,13 +36,28 @@ MENDS = {
 
 @contextmanager
 def temporary_file(path: Path) -> Iterator[Path]:
-    """Yield `path`, which is gone when the block ends, unless it has been moved elsewhere."""
-    remove = partial(path.unlink, missing_ok=True)
-    with if_abandoned(remove):
+    """Yield `path`, which is gone when the block ends, unless it has been moved elsewhere.
+
+    It goes also from a folder that has another name by then, where the system lets a folder be held.
+    """
+    with ExitStack() as stack:
+        remove: Callable[[], None] = partial(path.unlink, missing_ok=True)
+        with suppress(OSError):  # there is no folder, as will be told when the file is made
+            if os.unlink in os.supports_dir_fd:
+                # what is only held, as Linux has it, need not be readable
+                folder = os.open(path.parent, getattr(os, "O_PATH", os.O_RDONLY) | os.O_DIRECTORY)
+                stack.callback(os.close, folder)
+                remove = partial(_remove_from, folder, path.name)
+        stack.enter_context(if_abandoned(remove))
         try:
             yield path
         finally:
             remove()
+
+
+def _remove_from(folder: int, name: str) -> None:
+    with suppress(FileNotFoundError):
+        os.unlink(name, dir_fd=folder)
 
 
 def temporary_beside(path: Path) -> Path:

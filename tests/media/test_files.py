@@ -95,6 +95,24 @@ def test_a_name_in_other_capitals_is_the_same_file_where_the_disk_says_so(tmp_pa
     check_kept(source, tmp_path / "b.png")
 
 
+def test_a_folder_that_is_renamed_meanwhile_keeps_nothing_half_written(tmp_path: Path) -> None:
+    """The temporary file stayed in it, hidden, as it was looked for where the folder had been."""
+    folder, elsewhere = tmp_path / "folder", tmp_path / "elsewhere"
+    folder.mkdir()
+    (folder / "a.png").write_bytes(b"before")
+    said = f"^Cannot write {folder}/a.png: its folder is gone; make it again or choose another"
+
+    def write() -> None:
+        with replacing(folder / "a.png") as temporary:
+            temporary.write_bytes(b"half")
+            folder.rename(elsewhere)
+
+    with pytest.raises(UserError, match=said):
+        write()
+    assert [(path.name, path.read_bytes()) for path in elsewhere.iterdir()] == [("a.png", b"before")]
+    assert not folder.exists()
+
+
 def test_who_may_read_a_file_stays_so_when_it_is_replaced(tmp_path: Path) -> None:
     (file := tmp_path / "a.png").touch(0o600)
     file.chmod(0o640)
