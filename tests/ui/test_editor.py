@@ -1622,6 +1622,19 @@ def test_measuring_the_machine_leaves_what_can_be_redone(automatic: Robot) -> No
     assert [stroke.tool for stroke in automatic.editor.session.recipe.stroke] == ["push"]
 
 
+def test_what_is_measured_has_none_of_the_forces_of_the_work(automatic: Robot) -> None:
+    """How fast the machine is would depend on them; and one that no map can follow would end it."""
+    session, quality = automatic.editor.session, automatic.editor.quality
+    force = VortexForce(kind="vortex", point=(0.5, 0.5), radius=0.2, strength=1e6)
+    session.edit("A force", force=(force,))
+    session.seek(0)
+    assert quality.is_measuring
+    automatic.until(lambda: not quality.is_measuring)
+    assert quality.speed is not None
+    assert not [message for message in automatic.editor.messages.shown if "throws the fluid" in message.text]
+    assert session.recipe.force == (force,)
+
+
 def test_a_recipe_with_a_force_that_no_map_can_follow_is_told_of_while_the_machine_is_measured(
     automatic: Robot, tmp_path: Path
 ) -> None:

@@ -32,6 +32,7 @@ from app.ui.key_sheet import KeySheet
 from app.ui.preferences import Preferences
 from app.ui.recovery_dialog import Offer
 from app.ui.saving import SaveDialog
+from app.ui.window import SMALLEST
 from app.work.journal import Origin, Work
 from app.work.recovery import Found
 from solver.gl.device import Device
@@ -39,7 +40,7 @@ from support.drawn import Drawn
 from support.editing import Robot, add_bars, pattern, small_project
 from support.laid import Laid
 
-SIZES = ((800, 520), (1280, 800), (3840, 2160))
+SIZES = (SMALLEST, (1280, 800), (3840, 2160))
 # Where room is short at every size of the interface, and where there is more at one or two: pairs, not all nine.
 AT_SCALES = (*((SIZES[0], scale) for scale in (1.0, 1.5, 2.0)), (SIZES[1], 1.5), (SIZES[2], 1.0), (SIZES[2], 2.0))
 
