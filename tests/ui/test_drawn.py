@@ -291,22 +291,24 @@ def a_tick_a_frame(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("tour", TOURS, ids=lambda tour: tour.__name__)
-def test_draws_what_is_written_down(
-    device: Device, tmp_path: Path, tour: object, golden: dict[str, list[str]], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_draws_what_is_written_down(device: Device, tmp_path: Path, tour: object, golden: dict[str, list[str]]) -> None:
     if not device.limits.is_software or (not WRITES and FILE.read_text("utf-8").split("\n")[0] != imgui.get_version()):
         pytest.skip("letters lie elsewhere in other versions of imgui, and numbers differ on other GPUs")
     robot = Robot(device, small_project(tmp_path), HIGH if tour in (panels, handles) else (1100, 720), sees=True)
-    drawn, before = Drawn(monkeypatch), Counter[str]()
-    told: list[str] = []
+    before, told = Counter[str](), list[str]()
+
+    def drawn_in_a_frame() -> list[str]:
+        """Of one in several: what is noted takes its time."""
+        with pytest.MonkeyPatch.context() as noting:
+            drawn = Drawn(noting)
+            robot.frame()
+        return drawn.take()
+
     try:
         if tour is not tools_and_marks:  # of which the first scene is what all begin with
-            robot.frame()
-            before = Counter(drawn.take())
+            before = Counter(drawn_in_a_frame())
         for scene in tour(robot):  # pyright: ignore[reportCallIssue]
-            drawn.take()
-            robot.frame()
-            lines = [re.sub(r"at \d\d:\d\d", "at some time", line) for line in drawn.take()]
+            lines = [re.sub(r"at \d\d:\d\d", "at some time", line) for line in drawn_in_a_frame()]
             lines = [line.replace(str(tmp_path), "FOLDER").replace("\n", " ") for line in lines]
             lines = [line for line in lines if "Simulating" not in line]  # so many steps as there was time for
             # What stays as it is, is written down once.
