@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
-from itertools import pairwise
+from itertools import pairwise, product
 from pathlib import Path
 
 import numpy as np
@@ -27,7 +27,7 @@ from app.model.tools import TOOL, TOOLS, BrushSettings, Press
 from app.progress import Progress
 from app.work.export import run
 from app.work.gesture import kept_near
-from app.work.handle_status import FIT
+from app.work.handle_status import ARRIVED, FIT, as_seen, held_in, unmet
 from app.work.jobs import Job, MapOutput, Outputs
 from app.work.replay import Replay
 from app.work.session import Session
@@ -273,6 +273,64 @@ def test_a_stroke_goes_on_beyond_the_edges_by_half_a_picture(session: Session) -
     painted = session.recipe.mask[-1]
     assert isinstance(painted, MaskStroke)
     assert painted.samples[-1][1:3] == (1.5, -0.5)
+
+
+def test_what_is_looked_for_only_once_is_what_is_there_whatever_has_been_done(session: Session) -> None:
+    """What is told of handles and of the warp is as if nothing had been looked for before."""
+    dt = session.dt
+    one = RecipeHandle(at=(0.4, 0.5), to=(0.5, 0.5), duration=4 * dt)
+    other = RecipeHandle(at=(0.7, 0.3), to=(0.5, 0.3), start=2 * dt, duration=2 * dt, stiffness=0.01)
+
+    def elsewhere(handle: RecipeHandle) -> None:
+        session.edit("Move", handle=(handle, *session.recipe.handle[1:]))
+
+    ways: list[Callable[[], object]] = [
+        lambda: session.edit("Handles", handle=(one, other), duration=8 * dt),
+        lambda: session.seek(5),
+        lambda: session.seek(3),
+        lambda: elsewhere(one.model_copy(update={"to": (0.4, 0.6)})),
+        lambda: elsewhere(one.model_copy(update={"to": (0.4, 0.6), "name": "left"})),
+        lambda: session.edit("Amount", amount=0.5),
+        lambda: session.seek(0),
+        lambda: elsewhere(one.model_copy(update={"to": (0.3, 0.5)})),
+        lambda: session.edit("Mute", handle=(one, other.model_copy(update={"muted": True}))),
+        session.undo,
+        lambda: session.seek(8),
+        lambda: session.edit("Amount", amount=1.2),
+        session.undo,
+        session.undo,
+        lambda: session.seek(8),
+        lambda: session.edit("Farther", handle=(one, other.model_copy(update={"to": (0.4, 0.3)}))),
+        lambda: session.edit("None", handle=()),
+    ]
+    seen = list[list[object]]()
+    for way, settles in product(ways, (False, True)):
+        (session.settle if settles else way)()
+        found = [session.held, session.marks, session.unmet, session.folds]
+        assert found == [session.held, session.marks, session.unmet, session.folds]
+        replay = session.replay
+        held = held_in(replay, session.target)
+        amount = replay.recipe.amount
+        is_over = not session.is_moving and session.tick == session.end and replay.recipe.leads
+        missed = unmet(replay, ARRIVED) if is_over else ()
+        assert found[:3] == [
+            held, held if amount == 1 else as_seen(held, replay), {each.label: each for each in missed},
+        ]  # fmt: skip
+        seen.append(found)
+    changed = [sum(before != after for before, after in pairwise(column)) for column in zip(*seen, strict=True)]
+    assert np.greater_equal(changed[:3], (9, 9, 3)).all()
+    # However far the simulation is behind the hand.
+    keys = tuple((tick * dt, 0.4 + tick / 100, 0.5) for tick in (2, 4, 6, 8))
+    session.edit("Keys", handle=(RecipeHandle(at=(0.4, 0.5), keys=keys),), amount=0.5)
+    session.seek(1)
+    session.settle()
+    aims = []
+    for tick in (3, 5, 8):
+        session.seek(tick)
+        aims.append([session.held, session.marks])
+        held = held_in(session.replay, session.target)
+        assert (session.target, aims[-1]) == (tick, [held, as_seen(held, session.replay)])
+    assert aims[0] != aims[1] != aims[2]
 
 
 def test_a_fit_is_offered_but_straight_after_one(session: Session) -> None:
