@@ -1157,6 +1157,26 @@ def test_a_clip_whose_times_begin_below_zero_is_read_from_there(tmp_path: Path, 
     assert np.array_equal(picture.pixels, frames[12])
 
 
+@pytest.mark.parametrize("name", ["a.mkv", "a.ogv", "a.gif", "a.apng", "f.%02d.png"])
+def test_frames_from_any_number_on_are_those_of_the_whole_and_can_be_cancelled(tmp_path: Path, name: str):
+    """Of clips that can be searched, that must be read from their beginning, and whose frames are pictures."""
+    codec = {"a.mkv": ("-c:v", "ffv1"), "a.apng": ("-f", "apng")}.get(name, ())
+    generate(tmp_path / name, "testsrc2=s=32x24:r=10:d=0.5", *codec)
+    clip = open_source(tmp_path / name).clip
+    assert clip is not None
+    whole = list(clip.pictures())
+    assert [number for number, _ in whole] == list(range(clip.start, clip.start + 5))
+    for first in range(5):
+        found = list(clip.pictures_from(clip.start + first))
+        assert [number for number, _ in found] == [number for number, _ in whole[first:]]
+        for (_, one), (_, other) in zip(found, whole[first:], strict=True):
+            assert np.array_equal(one.pixels, other.pixels)
+        for ways in (clip.pictures((clip.start + first, None), cancel=lambda: True),
+                     clip.pictures_from(clip.start + first, cancel=lambda: True)):  # fmt: skip
+            with pytest.raises(Cancelled):
+                list(ways)
+
+
 @pytest.mark.parametrize("ending", ["mp4", "mov", "mkv", "webm"])
 @pytest.mark.parametrize("first", [0, 12])
 def test_the_sound_of_a_clip_whose_times_begin_below_zero_is_kept(tmp_path: Path, ending: str, first: int):

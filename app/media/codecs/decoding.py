@@ -12,7 +12,7 @@ from contextlib import AbstractContextManager, ExitStack, contextmanager, redire
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from app.errors import UserError
+from app.errors import Cancelled, UserError
 from app.media.inputs import read_start
 
 
@@ -23,7 +23,7 @@ def decoding(file: Path, name: str) -> Iterator[None]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             yield
-    except UserError:
+    except (UserError, Cancelled):
         raise
     except MemoryError:
         raise UserError(
