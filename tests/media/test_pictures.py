@@ -33,6 +33,7 @@ from app.media.encoders import check_output
 from app.media.ffmpeg import executable
 from app.media.formats import FORMATS
 from app.media.holding import unheld
+from app.media.losses import unusual_colours
 from app.media.pictures import read_picture, write_picture
 from app.model.picture import Picture, linear_to_srgb, srgb_to_linear
 from app.work.jobs import Outputs
@@ -641,6 +642,7 @@ def test_the_colours_of_an_avif_are_told(tmp_path: Path):
     assert read_picture(tmp_path / "a.avif").note == (
         "a.avif: its colours are BT.2020 PQ (nclx) and are treated as sRGB"
     )
+    assert unusual_colours(*read_picture(tmp_path / "a.avif").chunks[b"cICP"][:2]) == "BT.2020 PQ"
     write_picture(tmp_path / "a.avif", Picture(smooth(3)))
     assert read_picture(tmp_path / "a.avif").note == ""
     plain = (tmp_path / "a.avif").read_bytes()

@@ -298,6 +298,35 @@ def test_a_frame_is_awaited_until_it_is_the_one_that_is_shown() -> None:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Failing(Counted):
+    """It cannot be read from its fourth frame on."""
+
+    def pictures(self, part: FrameRange = WHOLE, *_: Any, **others: Any) -> Generator[tuple[int, Picture], None, None]:
+        for number, picture in super().pictures(part):
+            if number >= 3:
+                raise UserError("it cannot be read")
+            yield number, picture
+
+
+def test_of_what_cannot_be_read_nothing_is_awaited_but_what_is_there() -> None:
+    clip = Failing(path=Path("a"), width=2, height=2, bits=8, alpha=False, pixel_format="", fps=RATE, frames=5)
+    reel = Reel(clip, lambda picture: picture.pixels)
+    reel.want(1, runs=False)
+    deadline = time.monotonic() + 60
+    while reel.best() is None and time.monotonic() < deadline:
+        time.sleep(0.001)
+    assert reel.awaits(0)
+    reel.want(4, runs=True)
+    while not reel.error and time.monotonic() < deadline:
+        time.sleep(0.001)
+    assert not reel.awaits(1)
+    reel.want(1, runs=True)
+    assert reel.error == "it cannot be read"
+    assert (reel.awaits(1), reel.awaits(0)) == (False, True)
+    reel.close()
+
+
+@dataclass(frozen=True, kw_only=True)
 class Losing(Counted):
     """Of it something is lost when it is read."""
 

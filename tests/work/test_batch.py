@@ -707,6 +707,8 @@ def test_a_state_is_kept_every_64_ticks_and_at_the_end(device: Device, folder: P
         replay.advance()
     kept.keep(last=True)
     assert sorted(int(path.name[-17:-10]) for path in (folder / "states").iterdir()) == [64, 128, 130]
+    there = newest(folder / "states")  # and somebody's copy of one, under a name that is no tick
+    there.with_name(there.name.replace("0000130", "copy-of-1")).write_bytes(there.read_bytes())
     for wanted, found in ((63, None), (127, 64), (129, 128), (200, 130)):
         other = Replay(device, still, Pictures(read_picture(folder / "p0.png")), budget=0)
         assert states.StoredStates(folder / "states", other, pytest.fail).resume(wanted) == (found is not None)
