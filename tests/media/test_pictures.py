@@ -1212,6 +1212,14 @@ def test_other_formats_in_their_depth(tmp_path: Path):
         read_picture(tmp_path / "deep.ppm")
 
 
+def test_a_tiff_whose_one_strip_is_longer_than_it_says_is_read(tmp_path: Path):
+    pixels = noise(3, np.uint8)
+    tifffile.imwrite(tmp_path / "a.tif", pixels, photometric="rgb")
+    with tifffile.TiffFile(tmp_path / "a.tif", mode="r+b") as tiff:
+        tiff.pages[0].tags["RowsPerStrip"].overwrite(2)
+    assert np.array_equal(read_picture(tmp_path / "a.tif").pixels, pixels)
+
+
 def test_a_tiff_that_lacks_strips_is_told_and_not_filled(tmp_path: Path):
     """However many it claims: a few hundred bytes would become gigabytes of zeros."""
     path = tmp_path / "a.tif"
