@@ -1215,8 +1215,8 @@ def test_other_formats_in_their_depth(tmp_path: Path):
 def test_a_tiff_whose_one_strip_is_longer_than_it_says_is_read(tmp_path: Path):
     pixels = noise(3, np.uint8)
     tifffile.imwrite(tmp_path / "a.tif", pixels, photometric="rgb")
-    with tifffile.TiffFile(tmp_path / "a.tif", mode="r+b") as tiff:
-        tiff.pages[0].tags["RowsPerStrip"].overwrite(2)
+    with tifffile.TiffFile(tmp_path / "a.tif", mode="r+") as tiff:
+        tiff.pages.first.tags["RowsPerStrip"].overwrite(2)
     assert np.array_equal(read_picture(tmp_path / "a.tif").pixels, pixels)
 
 
