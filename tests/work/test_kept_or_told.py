@@ -781,7 +781,7 @@ def test_what_is_lost_depends_on_the_codec_and_the_depth_that_are_asked_for(
     (tmp_path / "still.toml").write_text(RECIPE)
     write_map(tmp_path / "m.npy", Displacement(np.zeros((HEIGHT, WIDTH, 2), np.float32)))
     for number in (1, 2):
-        write_picture(tmp_path / f"p.{number}.png", Picture(with_alpha(smooth()).astype(np.uint16) * 257))
+        write_picture(tmp_path / f"p.{number}.png", Picture(with_alpha(smooth()).astype(np.uint16) * 256))
     black, eight = "no alpha, and is laid over black", "holds 8 bits a channel"
     cases: dict[str, list[str]] = {
         "-o a.mov": [], "-o b.mov --codec prores-422-hq": [black], "-o c.%d.png": [], "-o d.%d.png --bits 8": [eight],
