@@ -317,7 +317,16 @@ def test_where_there_is_no_driver_one_sentence_says_so_and_doctor_has_the_driver
     assert ran.returncode == 1
     (line,) = ran.stderr.splitlines()
     assert line.startswith("fluidwarp: no OpenGL 3.3 without a window")
+    asked = process(folder, "render", "b.toml", "-o", "b.png", **nothing, EGL_LOG_LEVEL="warning").stderr
+    assert "libEGL" in asked, "who asks for the driver's own words has them"
     assert "the driver says: libEGL" in " ".join(process(folder, "doctor", **nothing).stdout.split())
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="devices are numbered by EGL")
+def test_doctor_tries_the_device_that_is_asked_for(folder: Path):
+    ran = process(folder, "doctor", DISPLAY="", WAYLAND_DISPLAY="", **{GPU: "99999"})
+    assert ran.returncode == 1
+    assert "give FLUIDWARP_GPU another number, or none" in ran.stdout
 
 
 def test_doctor_finds_what_is_missing(monkeypatch: pytest.MonkeyPatch):

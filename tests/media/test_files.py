@@ -113,6 +113,20 @@ def test_a_folder_that_is_renamed_meanwhile_keeps_nothing_half_written(tmp_path:
     assert not folder.exists()
 
 
+@pytest.mark.skipif(os.name == "nt", reason="there a folder cannot be opened")
+def test_what_keeps_a_backup_outlasts_a_power_cut(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The new file is on the disk before it takes the place of the old one, and then the folder that names it."""
+    written: list[tuple[int, bytes]] = []
+    sync, file = os.fsync, tmp_path / "a.png"
+    file.write_bytes(b"before")
+    monkeypatch.setattr(
+        os, "fsync", lambda handle: (sync(handle), written.append((os.fstat(handle).st_ino, file.read_bytes())))
+    )
+    with replacing(file, backup=tmp_path / "a.bak") as temporary:
+        temporary.write_bytes(b"after")
+    assert written == [(file.stat().st_ino, b"before"), (tmp_path.stat().st_ino, b"after")]
+
+
 def test_who_may_read_a_file_stays_so_when_it_is_replaced(tmp_path: Path) -> None:
     (file := tmp_path / "a.png").touch(0o600)
     file.chmod(0o640)

@@ -17,6 +17,7 @@ import pytest
 from app.media import leftovers
 from app.media.files import replacing, temporary_beside
 from app.media.leftovers import sweep, temporary_folder, temporary_name
+from support.permissions import as_a_user, needs_permissions
 
 ROOT = Path(__file__).parents[2]
 
@@ -90,6 +91,18 @@ def test_a_folder_is_swept_once_in_a_process(tmp_path: Path):
         with replacing("b.png") as temporary:
             temporary.touch()
             assert (tmp_path / name).exists() == bool(number)
+
+
+@needs_permissions
+def test_into_a_folder_that_cannot_be_listed_a_file_is_written_all_the_same(tmp_path: Path):
+    (tmp_path / "drop").mkdir(0o300)
+    code = f"""
+from app.media.files import replacing
+with replacing({str(tmp_path / "drop/a.png")!r}) as temporary:
+    temporary.write_bytes(b"whole")
+"""
+    assert as_a_user(code, tmp_path).stderr == ""
+    assert (tmp_path / "drop/a.png").read_bytes() == b"whole"
 
 
 def dead() -> int:

@@ -202,6 +202,12 @@ def test_maps_made_elsewhere(tmp_path: Path):
     for x, y in (("U", "V"), ("uv.R", "uv.G"), ("forward.u", "forward.v")):
         OpenEXR.File(header, {x: st[..., 0].copy(), y: st[..., 1].copy()}).write(str(tmp_path / "a.exr"))
         np.testing.assert_allclose(read_map(tmp_path / "a.exr").values, map_.values, atol=6.1e-8)
+    parts = [
+        OpenEXR.Part(header | {"name": name}, {"R": s.copy(), "G": t.copy()})
+        for name, (s, t) in {"st": (st[..., 0], st[..., 1]), "other": (st[..., 1], st[..., 0])}.items()
+    ]
+    OpenEXR.File(parts).write(str(tmp_path / "parts.exr"))
+    np.testing.assert_allclose(read_map(tmp_path / "parts.exr").values, map_.values, atol=6.1e-8)
     write_picture(
         tmp_path / "a.tif", Picture(np.round(np.dstack([st, st[..., :1]]).clip(0, 1) * 65535).astype(np.uint16))
     )

@@ -15,7 +15,7 @@ import pytest
 
 from app.errors import UserError
 from app.media import project as projects
-from app.media.inputs import state_of
+from app.media.inputs import MOST_INDEX, state_of
 from app.media.opening import open_recipe
 from app.media.pictures import write_picture
 from app.media.project import Project, picture_names
@@ -189,6 +189,23 @@ def test_a_bomb_is_refused_before_it_is_unpacked(made: Project, tmp_path: Path) 
     assert path.stat().st_size < 2**20
     with pytest.raises(UserError, match=r"work\.fluidwarp holds a recipe of more than 64 MB"):
         projects.load(path)
+
+
+@pytest.mark.parametrize("beyond", [0, 1])
+def test_a_list_of_members_has_as_many_bytes_as_it_may_and_none_more(made: Project, tmp_path: Path, beyond: int) -> None:
+    path, count, each = tmp_path / "work.fluidwarp", 300, 46 + len("000")
+    projects.save(made, path)
+    with zipfile.ZipFile(path, "a") as archive:
+        room = MOST_INDEX + beyond - sum(46 + len(one.filename) + len(one.extra) for one in archive.infolist())
+        for number in range(count):
+            member = zipfile.ZipInfo(f"{number:03}")
+            member.comment = b"-" * (room * (number + 1) // count - room * number // count - each)
+            archive.writestr(member, b"")
+    if beyond:
+        with pytest.raises(UserError, match="is not a fluidwarp project, or is cut short or damaged"):
+            projects.load(path)
+    else:
+        assert projects.load(path).recipe == made.recipe
 
 
 def test_a_full_disk_leaves_the_old_file(made: Project, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

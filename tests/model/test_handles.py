@@ -62,6 +62,12 @@ def test_where_a_handle_goes_and_when_it_is_there() -> None:
     assert (led.ready, led.last, led.goal) == (1.0, 1.0, None)
 
 
+def test_a_line_is_led_from_the_mean_of_its_corners_to_that_of_its_goals() -> None:
+    line = {"points": [[0.1, 0.2], [0.2, 0.2], [0.6, 0.8]], "goals": [[0.1, 0.3], [0.3, 0.3], [0.8, 0.9]]}
+    led = RecipeHandle.model_validate(frozen(line))
+    assert (led.at, led.to) == (pytest.approx((0.3, 0.4)), pytest.approx((0.4, 0.5)))
+
+
 @pytest.mark.parametrize(
     ("line", "said"),
     [
