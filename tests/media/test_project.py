@@ -192,7 +192,7 @@ def test_a_bomb_is_refused_before_it_is_unpacked(made: Project, tmp_path: Path) 
 
 
 @pytest.mark.parametrize("beyond", [0, 1])
-def test_a_list_of_members_has_as_many_bytes_as_it_may_and_none_more(made: Project, tmp_path: Path, beyond: int) -> None:
+def test_a_list_of_members_has_as_many_bytes_as_it_may(made: Project, tmp_path: Path, beyond: int) -> None:
     path, count, each = tmp_path / "work.fluidwarp", 300, 46 + len("000")
     projects.save(made, path)
     with zipfile.ZipFile(path, "a") as archive:

@@ -1227,6 +1227,28 @@ def test_closed_maps_without_room_for_the_picture_are_boxes_of_it(
         made.release()
 
 
+def test_as_many_closed_maps_as_there_may_be_are_each_looked_up_in_their_own_box(
+    device: Device, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tiles, found = [((x + 0.5) / 3, (y + 0.5) / 3) for y in range(3) for x in range(3)], []
+    for room in (2**27, 768 * 768 * 8 - 1):
+        monkeypatch.setattr("solver.warp.accumulated.MOST_CLOSED_BYTES", room)
+        found.append(warp := WarpMap(device, Grid(96, 96), (768, 768)))
+        for place in tiles[:MOST_CLOSED]:
+            for _ in range(3):
+                warp.advance_prescribed(swirl(place, 0.12), 0.05)
+            warp.remap()
+            warp.close()
+    whole, boxed = found
+    state = boxed.save()
+    assert len({tuple(region) for region in state.values["closed regions"].tolist()}) == MOST_CLOSED
+    points = np.random.default_rng(2).random((8000, 2))
+    assert np.abs(whole.at(points)).max() > 0.5 / 96
+    assert difference(whole.at(points), boxed.at(points)) < 2e-6
+    for made in (state, *found):
+        made.release()
+
+
 def test_a_map_resumed_from_bytes_closes_the_same_box(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
     """Also where tiles that had moved hold nothing any more."""
     monkeypatch.setattr("solver.warp.accumulated.MOST_CLOSED_BYTES", 1024 * 1024 * 8 - 1)

@@ -279,6 +279,20 @@ def test_a_box_selects_the_bars_that_it_touches(painted: Robot) -> None:
     assert len(names(painted)) == 3  # nothing of which was an edit
 
 
+def test_a_box_is_drawn_between_where_it_was_begun_and_the_pointer(painted: Robot) -> None:
+    first = place(painted, 0)
+    (left, top), (right, bottom) = (first.x + 40, first.bottom + 45), (first.x + 90, first.bottom + 65)
+    painted.move(left, top)
+    painted.press()
+    painted.see()
+    before = painted.pixels().astype(int)
+    painted.move(right, bottom)
+    painted.frame(count=2)
+    down, across = np.nonzero((painted.pixels() != before).any(axis=2))
+    drawn = across.min(), down.min(), across.max(), down.max()
+    assert drawn == pytest.approx((left, top, right, bottom), abs=2)
+
+
 def test_the_fields_of_a_bar_set_when_how_long_how_strong_and_how_often(painted: Robot, widgets: Widgets) -> None:
     painted.key("h")  # which has no strength of its own
     before, dt = recipe(painted).stroke[1], painted.editor.session.dt

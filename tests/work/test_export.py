@@ -357,6 +357,19 @@ def test_a_map_for_every_frame(device: Device, picture: Path, tmp_path: Path):
     assert np.abs(cropped(first).values - second.values).max() < 1e-6
 
 
+@pytest.mark.parametrize("premultiplied", [False, True])
+def test_a_soft_alpha_through_a_map_is_what_was_rendered(device: Device, tmp_path: Path, premultiplied: bool):
+    pixels = np.random.default_rng(5).uniform(0, 1, (HEIGHT, WIDTH, 4))
+    if premultiplied:
+        pixels[..., :3] *= pixels[..., 3:]
+    write_picture(tmp_path / "a.tif", Picture(np.round(pixels * 65535).astype(np.uint16), premultiplied=premultiplied))
+    render(device, WHIRL, tmp_path / "a.tif", tmp_path / "b.tif", maps=MapOutput(tmp_path / "m.npy"))
+    apply(device, tmp_path / "m.npy", tmp_path / "a.tif", tmp_path / "c.tif")
+    rendered, applied = (read_picture(tmp_path / name) for name in ("b.tif", "c.tif"))
+    assert rendered.premultiplied == applied.premultiplied == premultiplied
+    np.testing.assert_allclose(applied.pixels.astype(int), rendered.pixels.astype(int), atol=65)
+
+
 @pytest.mark.parametrize("size", [48, 300])
 def test_a_map_at_any_size_with_overscan(device: Device, picture: Path, tmp_path: Path, size: int):
     """Inside it is the map without overscan; beyond the edge it goes on as on the edge."""
