@@ -122,6 +122,7 @@ class _Export:
         self.numbers: list[dict[str, Any]] = []
         self.dissolves: dict[int, Dissolve] = {}
         self._position: Fraction | None = None
+        self._last_shown = Fraction(0)  # where the handles shall have arrived
         device.timings.enabled = self.replay.fluid.measuring = self.outputs.stats is not None
 
     def release(self) -> None:
@@ -189,7 +190,8 @@ class _Export:
             amount = self.recipe.amount
             only_here = amount != 1 and not self.replay.warp.statistics(every).folds
             self.pictures.notice(f"{said} at an amount of {amount:g}, and in none at 1" if only_here else said)
-        missed = list(unmet(self.replay, ARRIVED))
+        # Behind the last frame, as where that was kept or is not the latest, they are still on their way.
+        missed = list(unmet(self.replay, ARRIVED)) if self.replay.tick >= int(self._last_shown) else []
         for each in missed:
             self.pictures.notice(each.said)
         if any(each.helped for each in missed):
@@ -260,8 +262,9 @@ class _Export:
             self.progress.expect(-kept.count)
             if said := kept.said(written):
                 self.pictures.notice(said)
+        self._last_shown = max(wanted, default=shown[-1])
         if maps is not None and not maps.is_sequence:
-            self._go_to(max(wanted, default=shown[-1]))
+            self._go_to(self._last_shown)
         return written
 
     def _records(self) -> dict[Path, Record]:

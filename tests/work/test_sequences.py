@@ -268,6 +268,19 @@ def test_a_mask_of_the_colours_of_a_frame_is_that_frame_s(folder: Path, fluidwar
     assert "has no frame 1003" in fluidwarp(folder, *still).stderr
 
 
+def test_what_is_kept_says_nothing_of_handles_that_are_on_their_way(folder: Path, fluidwarp: Run):
+    """Only as much is simulated as is missing; a handle that arrives by the last frame was told not to have begun."""
+    handle = "[[handle]]\nat = [0.4, 0.5]\nto = [0.45, 0.5]\nduration = 0.2\n"
+    (folder / "a.toml").write_text(f"duration = 0.4\n[fluid]\ngrid = 32\n[output]\nfps = 10\n{handle}")
+    write_picture(folder / "p.png", Picture((plate(1) * 255).astype(np.uint8)))
+    words = ["render", "a.toml", "p.png", "-o", "w.%02d.png", "--resume"]
+    assert fluidwarp(folder, *words).stderr == ""
+    for gone, kept in ((), 5), (("w.01.png",), 4):
+        for name in gone:
+            (folder / name).unlink()
+        assert fluidwarp(folder, *words).stderr == f"fluidwarp: {kept} of 5 frames were whole and are kept\n"
+
+
 def test_a_damaged_record_costs_no_more_than_the_work(folder: Path, fluidwarp: Run):
     words = ["render", "a.toml", "plate.%04d.exr", "-o", "w.%04d.exr"]
     assert fluidwarp(folder, *words).returncode == 0
