@@ -139,7 +139,8 @@ class Editing(Painting):
             self._went_back = False
         if commit:
             self.commit(name)
-            if self.target == self.end and (self.is_behind or self._is_away()):
+            # An edit of nothing lets nothing arrive, and so must not make the recording longer.
+            if self._last and self.target == self.end and (self.is_behind or self._is_away()):
                 self._coast()
 
     def _is_away(self) -> bool:

@@ -898,6 +898,24 @@ def test_what_is_retracted_lets_the_fluid_coast_on_if_it_did_so_before(session: 
     assert not session.is_behind
 
 
+def test_a_handle_that_is_set_to_what_it_was_makes_the_work_no_longer(session: Session) -> None:
+    """As by a slider that is dragged there and back: what is made again up to the end was let coast on, for nothing."""
+    handle = RecipeHandle(at=(0.4, 0.5), to=(0.45, 0.5), duration=0.1)
+    session.edit("Handle", handle=(handle,), duration=0.5)
+    session.settle()
+    session.seek(session.end)
+    session.settle()
+    before = session.document.recipe
+    session.edit_held("Turn", "handle[1]", False, rotate=30.0)
+    session.edit_held("Turn", "handle[1]", rotate=None)
+    assert session.is_behind
+    session.settle()
+    assert session.document.recipe == before
+    session.edit_held("Turn", "handle[1]", rotate=5.0)
+    session.settle()
+    assert session.end * session.dt > before.duration
+
+
 def test_what_is_retracted_behind_the_end_in_a_clip_leaves_the_playhead_there(device: Device, tmp_path: Path) -> None:
     """A clip that is longer than the recording goes on with the last warp."""
     for number in range(60):
