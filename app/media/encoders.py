@@ -251,9 +251,9 @@ def check_animation(
     size: tuple[int, int] | None = None,
     bits: int | None = None,
 ) -> None:
-    """Raise `UserError` if `animation_writer` has no format for `path`, or not this frame rate, codec or size.
+    """Raise `UserError` if `animation_writer` has no format for `path`, or not this frame rate, codec, size or depth.
 
-    bits: a channel, of the pictures of a sequence; a video has its own.
+    bits: a channel, of the pictures of a sequence; other animations have their codec's.
     """
     if not 0 < fps <= 1000:
         raise UserError(f"Cannot write {path}: a frame rate of {float(fps):g} is not between 0 and 1000.")
@@ -271,6 +271,9 @@ def check_animation(
         endings = " ".join(ANIMATIONS)
         raise UserError(f"Cannot write {path}: an animation ends in one of {endings}, or is name.%04d.png.")
     known = ANIMATIONS[suffix].codecs
+    if bits is not None:
+        mend = "leave out --bits, or write name.%04d.png"
+        raise UserError(f"Cannot write {path}: an animation has as many bits a channel as its codec; {mend}.")
     if codec is not None and codec not in known:
         raise UserError(f"Cannot write {path}: {suffix} holds {' or '.join(known)}, not {codec}; change --codec.")
     if suffix == ".gif" and fps > 50:
