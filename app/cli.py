@@ -380,15 +380,15 @@ def _perform(piece: Piece, given: list[Path], jobs: int, cluster: str | None, gp
             _perform_many(pieces, jobs, cluster, verbose)
         return
     piece = piece.named()
-    states, told = no_empty_folder(piece.outputs.states), list[str]()
+    states = no_empty_folder(piece.outputs.states)
 
-    def warn(said: str) -> None:
-        told.append(said)
+    def warn(said: str) -> bool:
         _tell(said)
+        return True
 
     with states, ExitStack() as stack, on_terminal(piece.outputs.files[0].name, None, warn=warn) as progress:
         report = piece.perform(lambda: stack.enter_context(Device.headless()), progress)
-    _tell(*(said for said in report.notices if said not in told), *([report.verdict] if report.verdict else []))
+    _tell(*report.notices, *([report.verdict] if report.verdict else []))
 
 
 def _choose(gpu: int | None) -> None:

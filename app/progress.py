@@ -26,11 +26,17 @@ def never() -> bool:
     return False
 
 
+def unheard(_said: str) -> bool:
+    """That nobody hears a warning."""
+    return False
+
+
 class Progress:
     """Counts the steps of a job; `report(done, total)` hears of each, `cancel()` answers whether to stop.
 
     `tell(state)` hears what is being done: "writing" and the like, where a step takes long; "" is the work itself.
-    `warn(said)` hears of what the user may want to stop it for; it is among the notices of the work too.
+    `warn(said)` hears of what the user may want to stop it for, and answers whether that has been told; if not, it is
+    among the notices of the work.
     The window passes its own callbacks; the command line uses `on_terminal`.
     """
 
@@ -40,7 +46,7 @@ class Progress:
         report: Callable[[int, int | None], None] = lambda done, total: None,
         cancel: Callable[[], bool] = never,
         tell: Callable[[str], None] = lambda state: None,
-        warn: Callable[[str], None] = lambda said: None,
+        warn: Callable[[str], bool] = unheard,
     ) -> None:
         self._total = total
         self.done = 0
@@ -214,7 +220,7 @@ def on_terminal(
     description: str,
     total: int | None,
     at_once: Callable[[], None] | None = leave,
-    warn: Callable[[str], None] = lambda said: None,
+    warn: Callable[[str], bool] = unheard,
 ) -> Iterator[Progress]:
     """A `Progress` drawn as a bar with the time left on stderr, silent when that is no terminal; Ctrl+C cancels.
 

@@ -99,9 +99,8 @@ class _Export:
         self.progress = progress
         self.device = device
         self.pictures = Pictures(job.picture, job.folder, job.frame[0] if job.frame else job.clip, job.named_by)
-        if said := job.too_fine:
+        if (said := job.too_fine) and not progress.warn(said):
             self.pictures.notice(said)
-            progress.warn(said)
         job.picture.pixels.flags.writeable = False  # so that it stays on the GPU from frame to frame
         playback = job.recipe.time
         # A moving source has no frame that is shown twice: what goes back does so in the simulation.
