@@ -88,19 +88,18 @@ struct Nodes {
     vec4 bend[4];
 };
 
-// 8 reads; f: where p lies between them, 0-1.
+// The cells of what it is read from: of two halves one below the other, each with a border of a cell.
+vec2 cells_of(sampler2D differences) { return vec2(textureSize(differences, 0)) * vec2(1.0, 0.5) - 2.0; }
+
+// 8 reads; f: where p lies between them, 0-1. What lies beyond the edges is in the border.
 Nodes nodes_at(sampler2D differences, vec2 p, vec4 images, out vec2 f) {
-    vec2 size = vec2(textureSize(differences, 0)) * vec2(1.0, 0.5), texel = 1.0 / size;
-    vec2 cell = cell_at(p, size, 0.0, images);
+    vec2 cell = cell_at(p, cells_of(differences), 0.0, images), texel = 1.0 / vec2(textureSize(differences, 0));
     f = p - 0.5 - cell;
-    vec4 ux, uy, vx, vy;
-    vec4 x = imaged(cell.x + vec4(0.5, 1.5, 0.5, 1.5), size.x, images.xy, ux, vx) * texel.x;
-    vec4 y = imaged(cell.y + vec4(0.5, 0.5, 1.5, 1.5), size.y, images.zw, vy, uy) * (0.5 * texel.y);
     Nodes nodes;
     for (int k = 0; k < 4; ++k) {
-        vec4 count = vec4(ux[k] * uy[k], vx[k] * vy[k], ux[k] * uy[k], vx[k] * vy[k]);
-        nodes.value[k] = count * texture(differences, vec2(x[k], y[k]));
-        nodes.bend[k] = count * texture(differences, vec2(x[k], y[k] + 0.5));
+        vec2 place = (cell + 1.5 + vec2(k % 2, k / 2)) * texel;
+        nodes.value[k] = texture(differences, place);
+        nodes.bend[k] = texture(differences, place + vec2(0.0, 0.5));
     }
     return nodes;
 }

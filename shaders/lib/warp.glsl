@@ -134,9 +134,6 @@ vec3 in_window(vec4 window, vec2 x) {
     return vec3(across, inside.x * inside.y);
 }
 
-// Of what a submap is read from: its differences lie below it.
-vec2 cells_of(sampler2D submap) { return vec2(textureSize(submap, 0)) * vec2(1.0, 0.5); }
-
 // The part w of what a submap moves at x, 0-1, with its slopes along x and y, texels of A: a spline times a weight that is
 // zero on a border is zero there too, continuously (Kantorovich and Krylov). w is 0 where the map is held and 1 from a cell
 // of the submap on, or FADED texels: equation (S7).

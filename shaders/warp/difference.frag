@@ -1,7 +1,7 @@
 // Difference: what a level S is read from between its cells, by Everett's formula with modified second differences (Comrie):
 // of the fourth differences a part is thrown back on the second, so that the cubic between two cells is nearly as exact as
 // the quintic of six. Drawn in two halves, as lib/displacement.glsl has them: above S and its second differences along both
-// axes, and below, with BENDS, those along x and along y.
+// axes, and below, with BENDS, those along x and along y; each within a border of a cell, the image of the cells inside.
 // u_displacement (S): cell centres; u_images: see lib/displacement.glsl. Next to an edge without images the cubic of the
 // outermost cells goes on.
 // reads: 10
@@ -33,9 +33,14 @@ vec2 bent(vec2 middle, vec2 axis, float far, vec2 size) {
 }
 
 void main() {
-    vec2 size = vec2(textureSize(u_displacement, 0)), cell = gl_FragCoord.xy - 0.5;
+    vec2 size = vec2(textureSize(u_displacement, 0)), place = gl_FragCoord.xy - 1.0;
 #ifdef BENDS
-    cell.y -= size.y;
+    place.y -= size.y + 2.0;
+#endif
+    vec4 ux, uy, vx, vy, x = imaged(place.xxxx, size.x, u_images.xy, ux, vx);
+    vec4 y = imaged(place.yyyy, size.y, u_images.zw, vy, uy);
+    vec2 cell = vec2(x.x, y.x) - 0.5, count = vec2(ux.x * uy.x, vx.x * vy.x);
+#ifdef BENDS
     vec2 middle = inside(cell, size, 2.0), far = cell - middle;
     vec2 along = bent(vec2(middle.x, cell.y), vec2(1.0, 0.0), far.x, size);
     out_differences = vec4(along, bent(vec2(cell.x, middle.y), vec2(0.0, 1.0), far.y, size));
@@ -46,4 +51,5 @@ void main() {
             both += (i == 0 ? -2.0 : 1.0) * (j == 0 ? -2.0 : 1.0) * at(middle + vec2(i, j), size);
     out_differences = vec4(at(cell, size), both);
 #endif
+    out_differences *= count.xyxy;
 }

@@ -177,8 +177,8 @@ class Remapping:
         """The composition of levels of one grid, with several texels a cell."""
         grid, (most, in_all) = levels[0].grid, MOST_GATHERED
         times = max(LEAST_TEXELS, min(math.isqrt(in_all // (grid.nx * grid.ny)), most))
-        largest = self.device.limits.max_texture_size  # `Differences` are twice as high
-        times = max(1, min(times, largest // grid.nx, largest // (2 * grid.ny)))
+        largest = self.device.limits.max_texture_size  # `Differences` are twice as high, with a border
+        times = max(1, min(times, (largest - 2) // grid.nx, (largest // 2 - 2) // grid.ny))
         field = self.device.field((times * grid.nx, times * grid.ny), 2, "gathered submap")
         compose = self.device.pass_("warp/compose.frag", GATHER=1, **defines_of(levels))
         left, top, width, height = window_of(grid)

@@ -29,7 +29,7 @@ class Differences:
 
     def of(self, device: Device, displacement: Field, images: Images) -> Field:
         """Of a displacement that is the same as last time, unless `forget` was called."""
-        width, height = displacement.size
+        width, height = displacement.size[0] + 2, displacement.size[1] + 2
         if self._drawn is None:
             self._drawn = Field(device, (width, 2 * height), 4, "differences", cleared=False)
         if self._images != images:
