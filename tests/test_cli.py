@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import re
@@ -9,6 +10,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from importlib import metadata
 from inspect import signature
 from pathlib import Path
 from typing import Any, get_args
@@ -18,7 +20,7 @@ import pytest
 from PIL import Image
 
 from app import cli, doctor, progress
-from app.errors import UserError
+from app.errors import Cancelled, UserError
 from app.gallery import figures, retouching
 from app.media.displacement import Displacement, PixelPlaces
 from app.media.maps import Kind, read_map, write_map
@@ -1246,15 +1248,104 @@ def test_what_prints_into_a_full_disk_and_where_the_folder_is_gone_a_sentence_sa
     assert (status, told) == (1, "fluidwarp: the folder that this runs in is gone; go to another one\n")
 
 
-def test_a_mistake_of_which_nothing_is_said_is_told_by_its_kind(
-    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+class ContextError(Exception):
+    """Known by its name, as that of the solver is, which is not loaded for it."""
+
+
+BUG = "FLUIDWARP_TRACEBACK=1 shows where"
+ENDS: list[tuple[BaseException, int, str]] = [
+    (UserError("a.png is gone"), 1, "a.png is gone"),
+    (UserError("a.mp4 has changed", 65, "in the window's words"), 65, "a.mp4 has changed"),
+    (Cancelled(), 130, "cancelled; nothing half-written is left"),
+    (KeyboardInterrupt(), 130, "interrupted"),
+    (MemoryError(), 1, "there is not enough memory; try a smaller --size or --grid"),
+    (ContextError("no OpenGL"), 1, "no OpenGL; `fluidwarp doctor` tells more"),
+    (RuntimeError(), 70, f"this is a bug in fluidwarp (RuntimeError); {BUG}"),
+    (KeyError("a"), 70, f"this is a bug in fluidwarp (KeyError: 'a'); {BUG}"),
+    (ValueError(" first\nsecond"), 70, f"this is a bug in fluidwarp (ValueError: first); {BUG}"),
+    (OSError(errno.EIO, "no disk"), 70, f"this is a bug in fluidwarp (OSError: [Errno {errno.EIO}] no disk); {BUG}"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("error", "status", "said"), ENDS, ids=lambda of: type(of).__name__)
+def test_whatever_goes_wrong_ends_in_one_sentence_and_a_status(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], error: BaseException, status: int, said: str
 ):
     def broken(**_: object) -> None:
-        raise RuntimeError
+        raise error
 
     monkeypatch.setattr("app.cli.cli", broken)
+    monkeypatch.setattr(sys, "argv", ["fluidwarp", "render"])
     with pytest.raises(SystemExit) as ended:
         cli.main()
-    assert ended.value.code == 70
-    said = "fluidwarp: this is a bug in fluidwarp (RuntimeError); FLUIDWARP_TRACEBACK=1 shows where\n"
-    assert capfd.readouterr().err == said
+    assert (ended.value.code, *capfd.readouterr()) == (status, "", f"fluidwarp: {said}\n")
+    if status == 70:
+        monkeypatch.setenv("FLUIDWARP_TRACEBACK", "1")
+        with pytest.raises(type(error)) as raised:
+            cli.main()
+        assert raised.value is error
+
+
+@pytest.mark.parametrize(("status", "ended"), [(None, 0), (0, 0), (1, 1), (3, 3)])
+def test_the_status_of_a_command_is_that_of_the_process(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], status: int | None, ended: int
+):
+    monkeypatch.setattr("app.cli.cli", lambda **_: status)
+    monkeypatch.setattr(sys, "argv", ["fluidwarp", "doctor"])
+    with pytest.raises(SystemExit) as found:
+        cli.main()
+    assert (found.value.code or 0, capfd.readouterr().err) == (ended, "")
+
+
+def test_an_interrupt_that_typer_has_made_a_status_of_is_told(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+):
+    monkeypatch.setattr("app.cli.cli", lambda **_: cli.INTERRUPTED)
+    monkeypatch.setattr(sys, "argv", ["fluidwarp", "doctor"])
+    with pytest.raises(SystemExit) as found:
+        cli.main()
+    assert (found.value.code, capfd.readouterr().err) == (cli.INTERRUPTED, "fluidwarp: interrupted\n")
+
+
+def test_who_reads_no_further_hears_of_nothing(tmp_path: Path):
+    """As `| head` does; and a pipe that is closed is no mistake of ours."""
+    reading, writing = os.pipe()
+    os.close(reading)
+    words = [sys.executable, "-m", "app", "--help"]
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    with open(writing, "wb") as closed:
+        ran = subprocess.run(words, stdout=closed, stderr=subprocess.PIPE, text=True, cwd=tmp_path, env=environment)
+    assert (ran.returncode, ran.stderr) == (1, "")
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "said"),
+    [
+        (["rendr"], 2, "rendr is neither a file nor a command; the commands are "),
+        (["a.toml"], 1, "a.toml does not exist; check the name of the picture, clip, recipe or project"),
+        (["here/there"], 1, "here/there does not exist; check the name of the picture, clip, recipe or project"),
+        (["f.%04d.png"], 0, ""),
+        (["cat.png", "dog.png"], 2, "got unexpected extra argument"),
+        (["render", ""], 1, "one of the words of this command is empty; is a variable in it not set?"),
+    ],
+)
+def test_a_first_word_that_is_no_command_is_a_file_or_refused(
+    tmp_path: Path, fluidwarp: Run, monkeypatch: pytest.MonkeyPatch, words: list[str], status: int, said: str
+):
+    (tmp_path / "cat.png").touch()
+    opened: list[Path | None] = []
+    monkeypatch.setattr(window, "run", opened.append)
+    ran = fluidwarp(tmp_path, *words)
+    assert (ran.returncode, ran.stdout, ran.stderr.count("\n")) == (status, "", 1 if said else 0)
+    assert ran.stderr.startswith(f"fluidwarp: {said}" if said else "")
+    assert opened == ([] if said else [Path(words[0])])
+    if words == ["rendr"]:
+        assert ran.stderr.endswith("the commands are edit, render, fit, apply, convert, gallery, doctor\n")
+
+
+def test_the_version_is_that_which_is_installed(tmp_path: Path, fluidwarp: Run):
+    said = f"fluidwarp {metadata.version('fluidwarp')}\n"
+    ran = fluidwarp(tmp_path, "--version")
+    assert (ran.returncode, ran.stdout, ran.stderr) == (0, said, "")
+    ran = fluidwarp(tmp_path, "--version", "render")  # which is not asked for alone, and so by typer
+    assert (ran.returncode, ran.stdout, ran.stderr) == (0, said, "")
