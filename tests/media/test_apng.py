@@ -18,9 +18,11 @@ from app.errors import UserError
 from app.media import pages
 from app.media.codecs import apng, layered, pillow
 from app.media.codecs import gif as gif_codec
+from app.media.codecs import webp as webp_codec
 from app.media.ffmpeg import executable
 from app.media.pages import read_pages
 from app.media.pictures import read_picture
+from app.media.source import open_source
 
 WIDTH, HEIGHT = 16, 12
 Part = tuple[int, int, np.ndarray, int, int]
@@ -211,8 +213,12 @@ def test_times_and_transparent_colours_of_frames(tmp_path: Path):
     assert again.frames[0].seconds == Fraction(1, 100)
 
 
-@pytest.mark.parametrize("fault", ["cut", "few", "beyond", "flipped"])
-def test_a_damaged_animation_is_told_as_that(tmp_path: Path, fault: str):
+@pytest.mark.parametrize(
+    ("fault", "told"),
+    [("cut", "chunk fdAT is damaged"), ("few", "has 1 of its 2 frames"), ("beyond", "reaches beyond the picture"),
+     ("flipped", "chunk fdAT is damaged")],
+)  # fmt: skip
+def test_a_damaged_animation_is_told_as_that(tmp_path: Path, fault: str, told: str):
     pixels = some(np.random.default_rng(0))
     data = encoded([(0, 0, pixels, 0, 0), (0, 0, pixels[:4, :4], 0, 1)])
     match fault:
@@ -227,7 +233,7 @@ def test_a_damaged_animation_is_told_as_that(tmp_path: Path, fault: str):
             at = data.rindex(b"fdAT") + 20
             data = data[:at] + bytes([data[at] ^ 1]) + data[at + 1 :]
     (path := tmp_path / "a.png").write_bytes(data)
-    with pytest.raises(UserError, match=r"a\.png: the PNG file is truncated or damaged .*; get it again\.$"):
+    with pytest.raises(UserError, match=rf"a\.png: the PNG file is truncated or damaged \(.*{told}\); get it again\.$"):
         read_pages(path, read_picture(path))
 
 
@@ -416,8 +422,12 @@ def test_frames_of_a_webp_with_losses_keep_their_alpha(tmp_path: Path):
         assert np.abs(picture.pixels[:, 6:, :3] - pixels[:, 6:, :3].astype(int)).max() < 12
 
 
-@pytest.mark.parametrize("fault", ["beyond", "other size", "cut", "empty"])
-def test_a_damaged_animated_webp_is_told_as_that(tmp_path: Path, fault: str):
+@pytest.mark.parametrize(
+    ("fault", "told"),
+    [("beyond", "reaches beyond the picture"), ("other size", "is not as large as it says"),
+     ("cut", "is not as large as it says"), ("short", "is cut"), ("empty", "is not as large as it says")],
+)  # fmt: skip
+def test_a_damaged_animated_webp_is_told_as_that(tmp_path: Path, fault: str, told: str):
     part = np.full((4, 4, 3), 90)
     data = webp([(0, 0, part, 0, 1), (WIDTH - 2 if fault == "beyond" else 6, 4, part, 0, 1)], told=False)
     last = data.rindex(b"ANMF")
@@ -425,10 +435,13 @@ def test_a_damaged_animated_webp_is_told_as_that(tmp_path: Path, fault: str):
         data = data[: last + 14] + b"\1" + data[last + 15 :]
     elif fault == "cut":
         data = data[: last + 30]
-    elif fault == "empty":
-        data = data[: last + 4] + struct.pack("<I", 16) + data[last + 8 : last + 24]
+    elif fault in ("empty", "short"):
+        length = 16 if fault == "empty" else 15
+        data = data[: last + 4] + struct.pack("<I", length) + data[last + 8 : last + 8 + length] + b"\0" * (length % 2)
         data = data[:4] + struct.pack("<I", len(data) - 8) + data[8:]
     (path := tmp_path / "a.webp").write_bytes(data)
+    with pytest.raises(ValueError, match=f"^a frame of it {told}$"):
+        webp_codec.frames(data)
     with pytest.raises(UserError, match=r"a\.webp: the WebP file is truncated or damaged .*; get it again\.$"):
         read_pages(path, read_picture(path))
 
@@ -459,6 +472,32 @@ def test_of_an_animation_no_more_frames_are_read_than_a_bound(
             assert first.note == f"a.{kind}: of its more than 3 frames only the first is used"
             with pytest.raises(UserError, match=r"^Cannot read .*: it has more than 3 frames; cut it into parts\.$"):
                 read_pages(path, first)
+
+
+@pytest.mark.parametrize("frames", [1, 2, 3])
+@pytest.mark.parametrize("told", [None, 0, 1, 2, 3, 4])
+def test_an_apng_has_as_many_frames_as_it_says(tmp_path: Path, frames: int, told: int | None):
+    """With fewer it is damaged; one that says nothing of frames, or of one alone, is a still, as browsers take it."""
+    data = encoded([(0, 0, np.full((HEIGHT, WIDTH, 4), 50 * number), 0, 0) for number in range(frames)])
+    at = data.index(b"acTL") - 4
+    data = data[:at] + (b"" if told is None else chunk(b"acTL", struct.pack(">II", told, 3))) + data[at + 20 :]
+    if told is not None and told > max(frames, 1):
+        with pytest.raises(ValueError, match=f"^it has {frames} of its {told} frames$"):
+            apng.read(data)
+        return
+    found = apng.read(data)
+    assert (found and len(found.frames)) == (told if told is not None and told > 1 else None)
+
+
+def test_a_png_of_which_the_frames_are_none_is_opened_as_a_still(tmp_path: Path):
+    still, *others = [Image.new("RGB", (WIDTH, HEIGHT), (40 * number, 90, 0)) for number in range(3)]
+    still.save(path := tmp_path / "a.png", save_all=True, append_images=others)
+    data = path.read_bytes()
+    at = data.index(b"acTL") - 4
+    for more in (b"", chunk(b"acTL", struct.pack(">II", 0, 0))):
+        path.write_bytes(data[:at] + more + data[at + 20 :])
+        source = open_source(path)
+        assert (source.clip, source.picture.note, source.picture.pixels[0, 0].tolist()) == (None, "", [0, 90, 0])
 
 
 @pytest.mark.parametrize(("count", "told"), [(3, "of its 3 frames none"), (1, "of its 1 frame none")])
