@@ -38,6 +38,9 @@ from support.khronos import Programs
 COMMAND = cache(typer.main.get_command)
 """Typer reads all annotations anew for each command line, which is most of what a wrong one costs."""
 
+BUG = 70
+"""The status of a mistake of ours, which no command line of a test ends with."""
+
 AS_PYTHON = re.compile(
     r"""[(\[{](['"])[^'"]*\1, ?['"]|\((['"])[^'"]*\2,\)|<[\w.]+ (object|at) |[a-z]\w+_keys\(|Path\("""
 )
@@ -187,6 +190,7 @@ def fluidwarp(device: Device, monkeypatch: pytest.MonkeyPatch, capfd: pytest.Cap
                 cli.main()
             except SystemExit as ended:
                 status = int(ended.code or 0)
+        assert status != BUG, capfd.readouterr().err
         return subprocess.CompletedProcess(words, status, *capfd.readouterr())
 
     return run

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image, ImageCms
 
+from app.errors import UserError
 from app.media.encoders import ANIMATIONS
 from app.media.formats import FORMATS, TABLE, Format
 from app.media.holding import unheld
@@ -100,6 +101,34 @@ def test_the_table_names_each_ending_and_each_signature_once():
     assert len(endings) == len(set(endings))
     assert list(FORMATS) == [ending for kind in WRITTEN for ending in kind.endings]
     assert all(kind.signature for kind in WRITTEN)
+
+
+PILLOWS = {"JPEG 2000": "JPEG2000", "PGM": "PPM", "PBM": "PPM", "PNM": "PPM"}
+
+
+@pytest.mark.parametrize("kind", [kind for kind in TABLE if not kind.write], ids=lambda kind: kind.name)
+def test_a_picture_under_the_ending_of_another_kind_is_what_it_is(tmp_path: Path, kind: Format) -> None:
+    """Written by Pillow, each kind that has no signature in the table under each ending, as those of all others are."""
+    mode = {"PGM": "L", "PBM": "1"}.get(kind.name, "RGB")
+    y, x = np.mgrid[0:32, 0:32]
+    colours = np.stack([x * 7, y * 7, (x + y) % 8 * 30], axis=-1).astype(np.uint8)
+    given = Image.fromarray(colours).convert("P").convert("RGB").convert(mode)
+    file = tmp_path / "a"
+    lossless = (
+        {"irreversible": False} if kind.name == "JPEG 2000" else {"sizes": [(32, 32)]} if kind.name == "ICO" else {}
+    )
+    given.save(file, format=PILLOWS.get(kind.name, kind.name), **lossless)
+    for other in TABLE:
+        for ending in other.endings:
+            file = file.rename(file.with_name(f"a{ending}"))
+            if kind.signature is None and other.signature is not None:  # by its ending alone it is nothing else
+                with pytest.raises(UserError, match="Cannot read"):
+                    read_picture(file)
+                continue
+            read = read_picture(file).pixels[..., :3]
+            np.testing.assert_array_equal(
+                read, np.asarray(given.convert("L" if mode == "1" else mode)).reshape(read.shape)
+            )
 
 
 def rows(heading: str) -> dict[str, list[str]]:
