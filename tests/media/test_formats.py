@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import struct
 from dataclasses import fields, replace
 from pathlib import Path
 
@@ -94,6 +95,30 @@ def test_a_format_keeps_what_the_table_says_and_nothing_else(tmp_path: Path, kin
     grey = replace(given.with_pixels(given.pixels[..., :1]), icc=None)
     write_picture(path, grey)
     assert (read_picture(path).pixels.shape[2] == 1) == kind.grey
+
+
+@pytest.mark.parametrize("kind", [kind for kind in WRITTEN if kind.name != "OpenEXR"], ids=lambda kind: kind.name)
+def test_what_is_written_is_one_picture_and_its_metadata_to_another_program(tmp_path: Path, kind: Format):
+    """With all that EXIF has, which Pillow finds in it again; the last directory of a TIFF names none after it."""
+    exif = Image.Exif()
+    exif[0x010F] = "A camera"
+    exif.get_ifd(0x8769)[0x9003] = "2020:01:02 03:04:05"
+    exif.get_ifd(0x8825)[1] = "N"
+    path = tmp_path / f"a{kind.endings[0]}"
+    for bits in {*kind.bits} - {32}:  # of which Pillow reads no colours
+        write_picture(path, replace(full(8), exif=exif.tobytes()), bits=bits)
+        with Image.open(path) as image:
+            assert getattr(image, "n_frames", 1) == 1
+            found = image.getexif()
+            assert (found[0x010F], found.get_ifd(0x8769)[0x9003], found.get_ifd(0x8825)[1]) == (
+                "A camera", "2020:01:02 03:04:05", "N"
+            )  # fmt: skip
+        if kind.name == "TIFF":
+            data = path.read_bytes()
+            (at,) = struct.unpack_from("<I", data, 4)
+            (count,) = struct.unpack_from("<H", data, at)
+            assert struct.unpack_from("<I", data, at + 2 + 12 * count) == (0,)
+        assert read_picture(path).note == ""
 
 
 def test_the_table_names_each_ending_and_each_signature_once():

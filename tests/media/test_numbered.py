@@ -47,6 +47,26 @@ def test_files_are_in_the_order_of_their_numbers(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("pattern", "said"),
+    [
+        ("a.png/f.%d.png", "a part of its path is a file; check the name."),
+        ("gone/f.%d.png", "there is no folder gone; check the name."),
+        ("a\0b/f.%d.png", "no file has a NUL in its name; check the name."),
+        ("f.%d.png", "there is no such file; check the name."),
+        (f"{'x' * 300}/f.%d.png", "the name is too long; check it."),
+    ],
+)
+def test_why_a_sequence_cannot_be_read_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, pattern: str, said: str
+) -> None:
+    (tmp_path / "a.png").touch()
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(UserError) as raised:
+        numbered_files(pattern)
+    assert str(raised.value) == f"Cannot read {pattern}: {said}".replace("\0", "\\x00")
+
+
+@pytest.mark.parametrize(
     ("there", "wanted", "said"),
     [
         ([1, 3], range(1, 4), "of 1-3 it lacks the frame 2;"),
