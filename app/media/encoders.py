@@ -51,6 +51,11 @@ class Stream:
     colours: Colours = USUAL
 
     @property
+    def is_shallow(self) -> bool:
+        """Of a high dynamic range in 8 bits: codecs that keep the depth are no mend for what has too few."""
+        return self.colours.is_high and self.bits == 8
+
+    @property
     def on_black(self) -> str:
         """The filters for a codec without alpha."""
         # In 8 bits, as ffmpeg 9 makes white black where it multiplies 16.
@@ -346,8 +351,9 @@ def check_colours(path: str | os.PathLike[str], codec: str | None, clip: Clip, a
     )
     if container is None and suffix == ".png":
         return
-    mend = "write .mov, .mkv, .mp4 with --codec h265, .webm with --codec av1, or name.%04d.png"
     stream = Stream(clip.alpha, clip.bits, colours=clip.colours)
+    others = "" if stream.is_shallow else ", .mkv, .mp4 with --codec h265, .webm with --codec av1,"
+    mend = f"write .mov{others} or name.%04d.png"
     _check_told(path, codec, container, stream, f"the colours of {clip.path} are {named}", mend)
 
 
@@ -366,8 +372,9 @@ def check_colours_of_picture(
         return
     container = ANIMATIONS.get(Path(path).suffix.lower()) if kind is None else None
     colours = uncoded(picture.chunks)
-    mend = "write .png" if kind is not None else "write .mov, .mkv or name.%04d.png"
     stream = Stream(picture.has_alpha, min(picture.bits, 16), colours=colours or USUAL)
+    videos = "" if colours is None else ".mov or " if stream.is_shallow else ".mov, .mkv or "
+    mend = "write .png" if kind is not None else f"write {videos}name.%04d.png"
     _check_told(path, codec, container if colours else None, stream, f"the picture's colours are {named}", mend)
 
 

@@ -2,13 +2,41 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Generator
+from contextlib import nullcontext
+from fractions import Fraction
+from functools import partial
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from PIL import ImageCms
 
 from app.errors import UserError
-from app.media.clip import USUAL
-from app.media.encoders import ANIMATIONS, Stream, check_animation, check_output, is_animation, passes
+from app.media.clip import USUAL, FileClip, uncoded
+from app.media.encoders import (
+    ANIMATIONS,
+    Stream,
+    check_animation,
+    check_colours,
+    check_colours_of_picture,
+    check_output,
+    depth_of,
+    is_animation,
+    passes,
+    written_size,
+)
+from app.media.formats import FORMATS
+from app.model.picture import Picture
+
+
+class Still(FileClip):
+    """A clip of which only what is known of it is asked."""
+
+    def pictures(self, *given: Any, **named: Any) -> Generator[tuple[int, Picture], None, None]:
+        raise NotImplementedError
 
 
 def option(options: list[str], name: str) -> str | None:
@@ -79,6 +107,72 @@ def test_what_a_name_asks_for() -> None:
     for name, how, said in refused:
         with pytest.raises(UserError, match=said):
             check_output(name, **how)
+
+
+TOLD = {"": (1, 13), "BT.2020 PQ": (9, 16), "BT.2020 HLG": (9, 18), "Display P3": (12, 13), "XYZ": (10, 13)}
+VIDEOS = ".mp4", ".webm", ".mkv", ".mov"
+NAMES = [
+    (f"a{number}{ending}", codec, animated)
+    for number, endings, animated in (("", FORMATS, False), ("", ANIMATIONS, True), (".%d", FORMATS, True))
+    for ending in endings
+    for codec in (None, *(ANIMATIONS[ending].codecs if not number and animated else ()))
+]
+
+
+@pytest.mark.parametrize("named", TOLD)
+@pytest.mark.parametrize("bits", [8, 16])
+def test_colours_go_where_they_can_be_told_and_a_refusal_names_what_tells_them(named: str, bits: int) -> None:
+    """Of stills and of animations of a picture, and of a clip, whose colours are written as a picture's are."""
+    values = np.zeros((4, 4, 3), np.uint8 if bits == 8 else np.uint16)
+    picture = Picture(values, chunks={b"cICP": bytes([*TOLD[named], 0, 1])})
+    colours = uncoded(picture.chunks)
+    assert (colours is None) == (named == "XYZ")
+    clip = Still(path=Path("b.mov"), width=4, height=4, bits=bits, alpha=False, pixel_format="yuv444p10le",
+                 fps=Fraction(25), colours=colours or USUAL)  # fmt: skip
+    for name, codec, animated in NAMES:
+        ending = Path(name).suffix
+        is_video = animated and ending in VIDEOS
+        few = is_video and bits_of(ending, codec, bits) < 10 and ("PQ" in named or "HLG" in named)
+        takes = not named or ((is_video and named != "XYZ" and not few) or (ending == ".png"))
+        asked = [partial(check_colours_of_picture, picture=picture)]
+        asked += [partial(check_colours, clip=clip)] if named != "XYZ" else []
+        for check in asked:
+            if takes:
+                check(name, codec, animated=animated)
+                continue
+            with pytest.raises(UserError) as raised:
+                check(name, codec, animated=animated)
+            what = "the colours of b.mov" if check.func is check_colours else "the picture's colours"
+            said = f"{what} are {named}, and 8 bits are too few" if few else f"it cannot tell that {what} are {named}"
+            assert str(raised.value).startswith(f"Cannot write {name}: {said}; write ")
+            mends = re.findall(r"(\S*\.\w+)(?: with --codec (\w+))?", str(raised.value).partition("; write ")[2])
+            assert mends
+            for other, more in mends:
+                other = f"a{other}" if other.startswith(".") else other
+                check(other, more or None, animated=is_animation(other))
+
+
+def bits_of(ending: str, codec: str | None, bits: int) -> int:
+    options = ANIMATIONS[ending].encoding(codec)(Stream(False, bits))
+    return depth_of(option(options, "-pix_fmt") or "")[0]
+
+
+def test_a_profile_tells_the_colours_too_where_a_file_has_one() -> None:
+    profile = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
+    picture = Picture(np.zeros((4, 4, 3), np.uint8), icc=profile, chunks={b"cICP": bytes([9, 16, 0, 1])})
+    for ending, kind in FORMATS.items():
+        for name, animated in ((f"a{ending}", False), (f"a.%d{ending}", True)):
+            with nullcontext() if "icc" in kind.keeps else pytest.raises(UserError, match="it cannot tell that"):
+                check_colours_of_picture(name, None, picture, animated)
+
+
+@pytest.mark.parametrize("ending", [*FORMATS, *ANIMATIONS])
+def test_a_result_has_the_size_that_is_told_of_it(ending: str) -> None:
+    """Odd sides become even in the videos whose encoders have no others, and in no file of a sequence."""
+    even = ending in (".mp4", ".webm", ".mov")
+    for size in ((4, 6), (5, 6), (4, 7), (5, 7), (1, 1)):
+        assert written_size(f"a{ending}", size) == tuple(side + side % 2 * even for side in size)
+        assert written_size(f"a.%d{ending}", size) == size
 
 
 def test_a_video_says_what_its_colours_are_and_a_lossless_one_that_they_are_srgb_s() -> None:
