@@ -165,10 +165,17 @@ def test_what_is_from_before_this_host_was_started_is_swept(tmp_path: Path):
     assert list(tmp_path.iterdir()) == [new]
 
 
-def test_without_a_list_of_processes_nothing_is_swept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(leftovers, "PROC", tmp_path / "none")
+@pytest.mark.parametrize("told", [None, "", "1", "1 (a) S", "1 (a) S " + "x " * 30, "1 (a) Z " + "1 " * 30])
+def test_without_a_list_of_processes_nothing_is_swept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, told: str | None
+):
+    """Nor where the system tells of this one what cannot be understood."""
     path = tmp_path / owned(pid=dead())
     path.touch()
+    monkeypatch.setattr(leftovers, "PROC", tmp_path / "proc")
+    if told is not None:
+        (own := tmp_path / "proc" / str(os.getpid())).mkdir(parents=True)
+        (own / "stat").write_text(told)
     sweep(tmp_path)
     assert path.exists()
 
