@@ -474,6 +474,19 @@ def test_of_an_animation_no_more_frames_are_read_than_a_bound(
                 read_pages(path, first)
 
 
+@pytest.mark.parametrize("kind", ["png", "gif", "webp"])
+def test_a_frame_larger_than_a_picture_may_be_is_refused(tmp_path: Path, kind: str):
+    """By the number that is given, which is that of the pixels of the largest frame, and no less."""
+    first = Image.new("RGB", (WIDTH, HEIGHT), (200, 90, 0))
+    first.save(path := tmp_path / f"a.{kind}", save_all=True, append_images=[Image.new("RGB", (WIDTH, HEIGHT))])
+    most = WIDTH * HEIGHT
+    picture = read_picture(path, most)
+    assert read_pages(path, picture, most) is not None
+    for read in (lambda: read_picture(path, most - 1), lambda: read_pages(path, picture, most - 1)):
+        with pytest.raises(UserError, match=f"more than the limit of {most - 1}"):
+            read()
+
+
 @pytest.mark.parametrize("frames", [1, 2, 3])
 @pytest.mark.parametrize("told", [None, 0, 1, 2, 3, 4])
 def test_an_apng_has_as_many_frames_as_it_says(tmp_path: Path, frames: int, told: int | None):

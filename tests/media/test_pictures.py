@@ -700,6 +700,22 @@ def test_a_grey_jpeg_2000_is_white_where_it_is(tmp_path: Path, bits: int):
     np.testing.assert_array_equal(read.pixels[..., 0], codes.astype(int) * np.iinfo(kind).max // (2**bits - 1))
 
 
+@pytest.mark.parametrize(("bits", "channels"), [(8, 1), (8, 3), (16, 1), (16, 3)])
+def test_a_codestream_alone_is_a_jpeg_2000_as_in_its_file(tmp_path: Path, bits: int, channels: int):
+    """It has no boxes, of which any could be lost; and tells its depth as one in a file does."""
+    kind = np.uint8 if bits == 8 else np.uint16
+    codes = np.random.default_rng(bits).integers(0, 2**bits, (8, 16, channels), kind).squeeze()
+    notes = []
+    for name, codec in (("a.jp2", "jp2"), ("a.j2k", "j2k")):
+        data = imagecodecs.jpeg2k_encode(codes, level=0, reversible=True, codecformat=codec)
+        (tmp_path / name).write_bytes(data)
+        read = read_picture(tmp_path / name)
+        told = f"{name}: its 16 bits a channel become 8" if (bits, channels) == (16, 3) else ""
+        assert (read.note, read.pixels.shape) == (told, (8, 16, channels))
+        notes.append(read.pixels)
+    np.testing.assert_array_equal(*notes)
+
+
 def test_a_jpeg_2000_of_boxes_without_end_is_read_at_once(tmp_path: Path):
     import imagecodecs
 

@@ -327,3 +327,42 @@ def test_a_picture_that_is_gone_is_told_with_who_names_it(made: Project, tmp_pat
     with pytest.raises(UserError) as error:  # that somebody else names
         open_recipe(str(recipe)).source(other)
     assert str(error.value) == f"Cannot read {other}: there is no such file; check the name."
+
+
+def test_a_recipe_that_names_no_picture_is_told_with_what_to_do(made: Project, tmp_path: Path) -> None:
+    (recipe := tmp_path / "r.toml").write_text("version = 5\nduration = 1\n")
+    for opened, mend in (
+        (lambda: projects.from_recipe(recipe), "; open a picture first, then apply the recipe to it"),
+        (lambda: open_recipe(str(recipe)).source(), "; give one with --image, or a key 'picture' in it"),
+    ):
+        with pytest.raises(UserError) as error:
+            opened()
+        assert str(error.value) == f"{recipe} names no picture{mend}"
+    assert open_recipe(str(recipe)).source(tmp_path / "photo.png").picture.width == 40
+
+
+def test_what_is_gone_is_neither_kept_in_a_project_nor_referred_to(made: Project, tmp_path: Path) -> None:
+    """Nor is what was saved before touched."""
+    recipe = made.recipe.edited(viscosity=({"kind": "picture", "picture": "mask.png", "scale": 1.0},))
+    project, work = replace(made, recipe=recipe), tmp_path / "work.fluidwarp"
+    projects.save(made, work)
+    before = work.read_bytes()
+    for embedded, said in (
+        (True, f"Cannot save the project. Cannot read {tmp_path / 'mask.png'}: there is no such file; check the name."),
+        (False, f"Cannot refer to {tmp_path / 'mask.png'}: it is gone; keep the picture in the project instead"),
+    ):
+        with pytest.raises(UserError) as error:
+            projects.save(project, work, embedded=embedded)
+        assert str(error.value) == said
+        assert work.read_bytes() == before
+
+
+def test_a_project_of_more_than_can_be_unpacked_is_refused(
+    made: Project, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    projects.save(made, work := tmp_path / "work.fluidwarp")
+    monkeypatch.setattr(projects, "MOST_BYTES", size := (tmp_path / "photo.png").stat().st_size)
+    assert projects.load(work).data == made.data
+    monkeypatch.setattr(projects, "MOST_BYTES", size - 1)
+    with pytest.raises(UserError, match="holds pictures of more than"):
+        projects.load(work)
