@@ -818,7 +818,10 @@ def test_what_a_process_may_not_have_is_not_told_as_missing(folder: Path, limit:
     assert said.removeprefix("fluidwarp: ") in ran.stderr
 
 
-@pytest.mark.parametrize("moment", ["while modules are loaded", "before a job has begun", "with something half done"])
+@pytest.mark.parametrize(
+    "moment",
+    ["while modules are loaded", "before a job has begun", "with something half done", "when the terminal is gone"],
+)
 def test_interrupted_before_it_does_anything_it_says_so(folder: Path, moment: str):
     import signal
 
@@ -834,11 +837,14 @@ def wait(**_):
     with app.progress.if_abandoned(undo): {waiting}
 app.cli.cli = wait
 {begin}"""
-    path = os.pathsep.join([str(folder), str(ROOT)] if moment == "while modules are loaded" else [str(ROOT)])
+    loading = moment in ("while modules are loaded", "when the terminal is gone")
+    path = os.pathsep.join([str(folder), str(ROOT)] if loading else [str(ROOT)])
     heard = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"  # behind `&` it would be ignored
+    if moment == "when the terminal is gone":
+        heard += "; import os; os.close(2)"
     started = subprocess.Popen(
         [sys.executable, "-c", f"{heard}\n{begin}"],
-        cwd=folder if moment == "while modules are loaded" else ROOT,
+        cwd=folder if loading else ROOT,
         env=os.environ | {"PYTHONPATH": path},
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -848,7 +854,8 @@ app.cli.cli = wait
     assert started.stdout.readline() == "now\n"
     started.send_signal(signal.SIGINT)
     done, told = started.communicate(timeout=60)
-    assert (started.returncode, told) == (cli.INTERRUPTED, "fluidwarp: interrupted\n")
+    said = "" if moment == "when the terminal is gone" else "fluidwarp: interrupted\n"
+    assert (started.returncode, told) == (cli.INTERRUPTED, said)
     assert done == "undone\n" * (moment == "with something half done")
 
 

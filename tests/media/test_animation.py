@@ -998,6 +998,27 @@ def test_sound_and_times_that_a_format_has_no_room_for_are_told(tmp_path: Path):
     )
 
 
+def test_frames_are_as_long_as_ffmpeg_says_or_fields_are(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """In its words "25 fps, 50 tbr" of frames that are stored as two fields, as it says of some codecs."""
+    path, ask = generate(tmp_path / "a.mp4", "testsrc=s=16x16:r=25:d=0.2", "-vf", "format=yuv420p"), ffmpeg.ask
+    shortest = ""
+
+    def other(*words: str) -> subprocess.CompletedProcess[bytes]:
+        done = ask(*words)
+        assert done.stderr.count(b", 25 tbr") == 1
+        done.stderr = done.stderr.replace(b", 25 tbr", f", {shortest} tbr".encode())
+        return done
+
+    monkeypatch.setattr(ffmpeg, "ask", other)
+    for shortest, varies, is_steady in (
+        ("25.25", False, True), ("24.25", True, False), ("25.75", True, False), ("50", False, False),
+        ("48.75", True, False), ("51.25", True, False), ("1k", True, False),
+    ):  # fmt: skip
+        clip = read_clip(path)
+        told = "a.mp4: its frames come at a rate that varies, and become 25 a second" if varies else ""
+        assert (clip.note, clip.is_steady) == (told, is_steady), shortest
+
+
 def test_a_rate_that_varies_is_told(tmp_path: Path):
     slower = "setpts='if(lt(N,10),N/25,10/25+(N-10)/10)/TB'"
     path = generate(
