@@ -1011,8 +1011,7 @@ def test_frames_are_as_long_as_ffmpeg_says_or_fields_are(tmp_path: Path, monkeyp
 
     monkeypatch.setattr(ffmpeg, "ask", other)
     for shortest, varies, is_steady in (
-        ("25.25", False, True), ("24.25", True, False), ("25.75", True, False), ("50", False, False),
-        ("48.75", True, False), ("51.25", True, False), ("1k", True, False),
+        ("25.25", False, True), ("24.25", True, False), ("50", False, False), ("51.25", True, False),
     ):  # fmt: skip
         clip = read_clip(path)
         told = "a.mp4: its frames come at a rate that varies, and become 25 a second" if varies else ""
