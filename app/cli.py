@@ -74,13 +74,15 @@ def main() -> None:
             raise UserError("the folder that this runs in is gone; go to another one")
         if "" in sys.argv[1:]:
             raise UserError("one of the words of this command is empty; is a variable in it not set?")
+        status = None
         if sys.argv[1:] == ["--version"]:  # without pydantic, which typer loads for any option, and takes as long again
             _print_version()
         else:
             status = cli(standalone_mode=False)
             if status == INTERRUPTED:  # typer has made that of the exception
                 raise KeyboardInterrupt
-            sys.exit(status)
+        sys.stdout.flush()  # where that cannot be, it is told here, and not by Python at its end
+        sys.exit(status)
     except UserError as error:
         _fail(str(error), error.status)
     except Cancelled:

@@ -1314,15 +1314,26 @@ def test_an_interrupt_that_typer_has_made_a_status_of_is_told(
     assert (found.value.code, capfd.readouterr().err) == (cli.INTERRUPTED, "fluidwarp: interrupted\n")
 
 
-def test_who_reads_no_further_hears_of_nothing(tmp_path: Path):
-    """As `| head` does; and a pipe that is closed is no mistake of ours."""
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no such device")
+def test_what_is_printed_where_nobody_reads_or_nothing_fits_is_no_mistake_of_ours(tmp_path: Path):
+    """As `| head` reads no further; also where Python keeps what is printed until the end."""
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
     reading, writing = os.pipe()
     os.close(reading)
-    words = [sys.executable, "-m", "app", "--help"]
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    with open(writing, "wb") as closed:
-        ran = subprocess.run(words, stdout=closed, stderr=subprocess.PIPE, text=True, cwd=tmp_path, env=environment)
-    assert (ran.returncode, ran.stderr) == (1, "")
+    with open(writing, "wb") as closed, open("/dev/full", "wb") as full:
+        for output, said in (
+            (closed, ""),
+            (full, "fluidwarp: what this prints cannot be written: the disk is full; free some space\n"),
+        ):
+            ran = subprocess.run(
+                [sys.executable, "-m", "app", "--version"],
+                cwd=tmp_path,
+                env=environment | {"PYTHONPATH": str(ROOT)},
+                stdout=output,
+                stderr=subprocess.PIPE,
+                text=True,
+            )
+            assert (ran.returncode, ran.stderr) == (1, said)
 
 
 @pytest.mark.parametrize(
