@@ -487,6 +487,26 @@ def test_a_frame_larger_than_a_picture_may_be_is_refused(tmp_path: Path, kind: s
             read()
 
 
+def test_a_frame_that_reaches_beyond_its_gif_counts_with_all_its_pixels(tmp_path: Path):
+    numbers = np.zeros((HEIGHT, WIDTH), int)
+    data = gif([(0, 0, numbers, 0, None), (0, 0, np.tile(numbers, (2, 1)), 0, None)], np.zeros((8, 3)))
+    (path := tmp_path / "a.gif").write_bytes(data)
+    picture = read_picture(path)
+    assert read_pages(path, picture, 2 * WIDTH * HEIGHT) is not None
+    with pytest.raises(UserError, match=f"a frame of it has more than the limit of {2 * WIDTH * HEIGHT - 1} pixels"):
+        read_pages(path, picture, 2 * WIDTH * HEIGHT - 1)
+
+
+@pytest.mark.parametrize("kind", ["png", "gif", "webp"])
+def test_frames_of_no_length_are_shown_for_a_tenth_of_a_second(tmp_path: Path, kind: str):
+    """As browsers do it."""
+    still, *others = [Image.new("RGB", (WIDTH, HEIGHT), (40 * number, 90, 0)) for number in range(3)]
+    still.save(path := tmp_path / f"a.{kind}", save_all=True, append_images=others, duration=0)
+    clip = read_pages(path, read_picture(path))
+    assert clip is not None
+    assert (clip.fps, clip.durations, clip.frames) == (10, None, 3)
+
+
 @pytest.mark.parametrize("frames", [1, 2, 3])
 @pytest.mark.parametrize("told", [None, 0, 1, 2, 3, 4])
 def test_an_apng_has_as_many_frames_as_it_says(tmp_path: Path, frames: int, told: int | None):
