@@ -33,7 +33,6 @@ from app.media.encoders import check_output
 from app.media.ffmpeg import executable
 from app.media.formats import FORMATS
 from app.media.holding import unheld
-from app.media.losses import unusual_colours
 from app.media.pictures import read_picture, write_picture
 from app.model.picture import Picture, linear_to_srgb, srgb_to_linear
 from app.work.jobs import Outputs
@@ -614,6 +613,22 @@ def test_a_jpeg_that_no_decoder_reads_is_not_called_damaged(tmp_path: Path, opti
         read_picture(tmp_path / "a.jpg")
 
 
+@pytest.mark.parametrize("kind", [kind for kind in range(0xC0, 0xD0) if kind not in (0xC4, 0xC8, 0xCC)])
+def test_every_way_of_a_jpeg_without_loss_is_told(tmp_path: Path, kind: int):
+    """They are the fourth of each four (ITU T.81, table B.1); of the others none is taken for one."""
+    Image.fromarray(smooth(3)).save(path := tmp_path / "a.jpg")
+    data = path.read_bytes()
+    at = data.index(b"\xff\xc0")
+    path.write_bytes(data[:at] + bytes([0xFF, kind]) + data[at + 2 :])
+    said = "a JPEG without loss is not supported" if kind % 4 == 3 else ""
+    try:
+        read_picture(path)
+        told = ""
+    except UserError as error:
+        told = str(error)
+    assert ("without loss" in told, said in told) == (bool(said), True)
+
+
 def test_every_segment_of_a_jpeg_is_kept_or_told(tmp_path: Path):
     path = tmp_path / "a.jpg"
     Image.fromarray(smooth(3)).save(path, comment=b"a", dpi=(300, 300), exif=exif_bytes(), progressive=True)
@@ -642,7 +657,7 @@ def test_the_colours_of_an_avif_are_told(tmp_path: Path):
     assert read_picture(tmp_path / "a.avif").note == (
         "a.avif: its colours are BT.2020 PQ (nclx) and are treated as sRGB"
     )
-    assert unusual_colours(*read_picture(tmp_path / "a.avif").chunks[b"cICP"][:2]) == "BT.2020 PQ"
+    assert read_picture(tmp_path / "a.avif").chunks == {b"cICP": bytes([9, 16, 0, 1])}  # of RGB, and of its full range
     write_picture(tmp_path / "a.avif", Picture(smooth(3)))
     assert read_picture(tmp_path / "a.avif").note == ""
     plain = (tmp_path / "a.avif").read_bytes()
@@ -1248,6 +1263,21 @@ def test_a_tiff_that_lacks_strips_is_told_and_not_filled(tmp_path: Path):
     path.write_bytes(data)
     with pytest.raises(UserError, match=r"a\.tif: the TIFF file is truncated .*it has 2 of its 1000 strips or tiles"):
         read_picture(path)
+
+
+def test_damaged_exif_of_a_tiff_costs_no_picture_and_is_told(tmp_path: Path) -> None:
+    """Whose place of it is the end of the file, of which Pillow only warns."""
+    exif = Image.Exif()
+    exif.get_ifd(0x8769)[0x9003] = "2020:01:02 03:04:05"
+    path = tmp_path / "a.tif"
+    write_picture(path, Picture(smooth(3), exif=exif.tobytes()))
+    assert read_picture(path).note == ""
+    data = path.read_bytes()
+    at = data.index(struct.pack("<HHI", 0x8769, 4, 1)) + 8
+    path.write_bytes(data[:at] + struct.pack("<I", len(data) - 1) + data[at + 4 :])
+    read = read_picture(path)
+    assert read.note == "a.tif: its EXIF is damaged and not kept whole"
+    np.testing.assert_array_equal(read.pixels, smooth(3))
 
 
 @pytest.mark.parametrize("ending", [".jpg", ".png", ".webp"])

@@ -7,6 +7,7 @@ import math
 import os
 import re
 import struct
+import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -146,9 +147,11 @@ def page_of(tiff: Any, file: Path, max_pixels: int, place: int | None = None) ->
         raise UserError(f"Cannot read {file}: a TIFF in {photometric} is not supported; convert it to RGB.")
 
     try:
-        encoded = upright_exif(_exif(file, place_of_tags, layout))
+        exif, is_damaged = _exif(file, place_of_tags, layout)
+        encoded = upright_exif(exif)
     except Exception:  # damaged metadata must not cost the picture
-        encoded = None
+        encoded, is_damaged = None, True
+    if is_damaged:
         losses.append("its EXIF is damaged and not kept whole")
     orientation = int(tags.get(ORIENTATION, 1))
     unit = INCHES.get(int(tags.get(296, 2)))
@@ -167,8 +170,11 @@ def page_of(tiff: Any, file: Path, max_pixels: int, place: int | None = None) ->
     )
 
 
-def _exif(file: Path, place: int, layout: tuple[str, bool]) -> Any:
-    """Pillow's EXIF of the directory at `place`; `layout` is the order of bytes, and whether it is a BigTIFF."""
+def _exif(file: Path, place: int, layout: tuple[str, bool]) -> tuple[Any, bool]:
+    """Pillow's EXIF of the directory at `place`, and whether its own directories are damaged.
+
+    layout: the order of bytes, and whether it is a BigTIFF.
+    """
     from PIL import Image
 
     exif = Image.Exif()
@@ -177,12 +183,14 @@ def _exif(file: Path, place: int, layout: tuple[str, bool]) -> Any:
         exif.load_from_fp(stream, place)
         for code in set(exif) - {*TEXTS, ORIENTATION, EXIF_IFD, GPS_IFD}:
             del exif[code]
-        for code in (EXIF_IFD, GPS_IFD):
-            exif.get_ifd(code)  # read while the file is open
+        with warnings.catch_warnings(record=True) as complaints:
+            warnings.simplefilter("always")
+            for code in (EXIF_IFD, GPS_IFD):
+                exif.get_ifd(code)  # read while the file is open; of what is cut Pillow only warns
     exif.bigtiff = False  # as which it is written elsewhere
     if LAYOUT.match(str(exif.get(DESCRIPTION, ""))):
         del exif[DESCRIPTION]
-    return exif
+    return exif, bool(complaints)
 
 
 def _ink_to_light(pixels: np.ndarray, premultiplied: bool) -> np.ndarray:
