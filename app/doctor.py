@@ -17,7 +17,7 @@ import app
 PATIENCE = 30  # seconds
 MISSING = "missing"
 LIBRARIES = (
-    *("moderngl", "glfw", "imgui-bundle", "numpy", "pydantic"),
+    *("moderngl", "glfw", "imgui-bundle", "numpy", "scipy", "pydantic", "tomlkit", "platformdirs"),
     *("pillow", "imagecodecs", "tifffile", "openexr", "imageio", "imageio-ffmpeg"),
 )
 

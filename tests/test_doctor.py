@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import platform
+import re
 import sys
 from importlib import metadata
 from pathlib import Path
@@ -93,6 +94,12 @@ def test_all_that_is_well_is_told_with_what_it_is(monkeypatch: pytest.MonkeyPatc
     assert every["--gpu 1"].said == "Card (Maker)"
     assert every["window"].said == "X11, OpenGL 3.3"
     assert every["video"].said.startswith("ffmpeg ")
+
+
+def test_every_library_that_is_needed_is_looked_for() -> None:
+    """But for those without which there is no command line to ask."""
+    needed = {re.split("[>; ]", each)[0] for each in metadata.requires("fluidwarp") or () if "extra ==" not in each}
+    assert sorted(doctor.LIBRARIES) == sorted(needed - {"typer", "rich"})
 
 
 def test_that_no_gpu_is_used_is_told_and_is_well(monkeypatch: pytest.MonkeyPatch) -> None:
