@@ -1141,8 +1141,16 @@ def test_a_clip_that_was_cut_before_is_read_and_told(tmp_path: Path):
     os.truncate(path, path.stat().st_size // 2)
     assert 10 < len(list(read_clip(path).read_frames(notice=said.append))) < 30
     path = generate(tmp_path / "b.mkv", "testsrc=s=64x48:r=10:d=4", "-f", "lavfi", "-i", "sine=d=8", "-c:v", "mjpeg")
-    assert len(list(read_clip(path).read_frames(notice=said.append))) == 40
+    clip = read_clip(path)
+    assert len(list(clip.read_frames(notice=said.append))) == 40
     assert len(said) == 2
+    heard: list[str] = []
+    for pictures in (
+        clip.pictures(notice=heard.append), clip.pictures_from(0, notice=heard.append),
+        clip.pictures_from(3, notice=heard.append),
+    ):  # fmt: skip
+        assert list(pictures)[-1][0] == 39
+    assert heard == said[1:] * 3, "whichever way its frames are asked for"
     assert "a.mkv is damaged, and what could be read of it was used" in said[0]
     told = f"{path} should have about 80 frames by its length, and has 40"
     assert said[1] == f"{told}: its sound is longer, or it was cut"

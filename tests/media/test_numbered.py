@@ -7,7 +7,16 @@ from pathlib import Path
 import pytest
 
 from app.errors import UserError
-from app.media.numbered import check_numbers, is_sequence, listed, number_in, numbered, numbered_files, unnumbered
+from app.media.numbered import (
+    check_numbers,
+    is_sequence,
+    is_there,
+    listed,
+    number_in,
+    numbered,
+    numbered_files,
+    unnumbered,
+)
 
 
 @pytest.mark.parametrize(
@@ -64,6 +73,16 @@ def test_why_a_sequence_cannot_be_read_is_told(
     with pytest.raises(UserError) as raised:
         numbered_files(pattern)
     assert str(raised.value) == f"Cannot read {pattern}: {said}".replace("\0", "\\x00")
+
+
+def test_whether_a_file_or_any_of_a_sequence_is_there(tmp_path: Path) -> None:
+    """Where there is no such folder, or a file in its place, there is none."""
+    (tmp_path / "a.07.png").touch()
+    for name, found in (
+        ("a.07.png", True), ("a.08.png", False), ("a.%02d.png", True), ("a.%03d.png", False), ("a.##.png", True),
+        ("gone/a.png", False), ("gone/a.%02d.png", False), ("a.07.png/a.%02d.png", False),
+    ):  # fmt: skip
+        assert is_there(tmp_path / name) is found, name
 
 
 @pytest.mark.parametrize(
