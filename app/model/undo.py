@@ -37,6 +37,8 @@ class History:
         self.budget = budget
         self._entries = [Entry("Open", recipe, _own_bytes(recipe, None))]
         self._index = self._made = 0
+        # The entries before the last commit, and which was the present; None once something else has been done.
+        self._before: tuple[list[Entry], int] | None = None
 
     @classmethod
     def restored(cls, entries: Sequence[Entry], index: int) -> History:
@@ -90,6 +92,7 @@ class History:
         if recipe is self.recipe or recipe == self.recipe:
             return
         self._made += 1
+        self._before = [*self._entries], self._index
         del self._entries[self._index + 1 :]
         self._entries.append(Entry(name, recipe, _own_bytes(recipe, self.recipe), self._made))
         self._index += 1
@@ -103,6 +106,7 @@ class History:
             return
         del self._entries[self._index + 1 :]
         self.go_on(recipe)
+        self._before = None
 
     def go_on(self, recipe: Recipe) -> None:
         """Let the present be `recipe`, as no edit: the recording goes on. What can be redone stays."""
@@ -112,15 +116,23 @@ class History:
 
     def replace_all(self, change: Callable[[Recipe], Recipe]) -> None:
         """Let every state be another recipe, which is no edit: the list stays as it is, and so does the present."""
-        self._entries = [replace(entry, recipe=change(entry.recipe)) for entry in self._entries]
+
+        def changed(entries: list[Entry]) -> list[Entry]:
+            return [replace(entry, recipe=change(entry.recipe)) for entry in entries]
+
+        self._entries = changed(self._entries)
+        if self._before is not None:
+            self._before = changed(self._before[0]), self._before[1]
 
     def undo(self) -> Recipe:
         """The recipe one edit earlier; the present one where there is none."""
+        self._before = None
         self._index = max(self._index - 1, 0)
         return self.recipe
 
     def redo(self) -> Recipe:
         """The recipe one edit later; the present one where there is none."""
+        self._before = None
         self._index = min(self._index + 1, len(self._entries) - 1)
         return self.recipe
 
@@ -132,7 +144,17 @@ class History:
         """
         if not 0 <= index < len(self._entries):
             raise IndexError(f"the history has {len(self._entries)} entries, not one number {index}")
+        self._before = None
         self._index = index
+        return self.recipe
+
+    def retract(self) -> Recipe:
+        """Take the last commit back as if it had never been, if nothing else has been done since; the present recipe.
+
+        It cannot be redone, and what could be redone before it can be again.
+        """
+        if self._before is not None:
+            (self._entries, self._index), self._before = self._before, None
         return self.recipe
 
 

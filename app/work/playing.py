@@ -146,7 +146,7 @@ class Playing(Editing):
             self._record()
 
     def retract(self) -> None:
-        """Take back what was committed last, unless it had changed nothing: Undo would take what was done before it.
+        """Take back what was committed last, unless it had changed nothing, as if it had never been: it is no Redo.
 
         The playhead stays where it is, or goes back to where a setting was changed: the hand goes on with that there.
         What has been played all along, as with the amount, plays on, and fluid that has coasted coasts on.
@@ -154,7 +154,8 @@ class Playing(Editing):
         if (last := self._last) is not None:
             tick = self.moment if last.changed_at is None else last.changed_at
             plays, coasts = self.playing, self.coasting and last.coasts_on
-            self.undo()
+            self.release()
+            self._show(self.document.history.retract())
             self.seek(min(tick, self.end) if coasts else tick)
             self.playing = plays
             if coasts:

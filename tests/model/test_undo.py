@@ -90,10 +90,15 @@ def test_random_actions_against_a_plain_list():
         history = History(Recipe())
         model, present = [history.recipe], 0
         for step in range(200):
-            action = rng.choice(["commit", "commit", "undo", "redo", "jump"])
-            if action == "commit":
+            action = rng.choice(["commit", "commit", "retract", "undo", "redo", "jump"])
+            if action in ("commit", "retract"):
                 recipe = Recipe(name=f"{seed} {step}")
+                before = history.entries
                 history.commit("Edit", recipe)
+                if action == "retract":
+                    assert history.retract() is model[present]
+                    assert history.entries == before
+                    continue
                 del model[present + 1 :]
                 model.append(recipe)
                 present += 1
@@ -108,6 +113,29 @@ def test_random_actions_against_a_plain_list():
                 history.go_to(present)
             assert history.recipe is model[present]
             assert (history.can_undo, history.can_redo) == (present > 0, present < len(model) - 1)
+
+
+def test_what_is_retracted_has_never_been_and_so_has_ended_nothing():
+    """Also on another grid by then, and where it had let the oldest go; after anything else, nothing is taken back."""
+    history = History(Recipe())
+    history.budget = history.nbytes * 3
+    for name in ("A", "B"):
+        history.commit(name, Recipe(name=name))
+    history.undo()
+    before = history.entries
+    history.commit("Long", Recipe(name="C", stroke=(stroke(1, 100),)))
+    assert [entry.name for entry in history.entries] == ["Long"]
+    history.replace_all(lambda recipe: recipe.on_grid(64))
+    assert history.retract().name == "A"
+    assert [(entry.name, entry.number) for entry in history.entries] == [(one.name, one.number) for one in before]
+    assert {entry.recipe.fluid.grid for entry in history.entries} == {64}
+    assert (history.undo_name, history.redo_name) == ("A", "B")
+    for does in (history.undo, history.redo, lambda: history.go_to(2), lambda: history.amend(Recipe(name="D"))):
+        history.commit("C", Recipe(name="C"))
+        does()
+        entries, index = history.entries, history.index
+        history.retract()
+        assert (history.entries, history.index) == (entries, index)
 
 
 def test_no_such_entry():

@@ -439,16 +439,16 @@ class Work(RuleBasedStateMachine):
 
     @rule()
     def retract(self) -> None:
-        """What a slider has done is taken back, unless that was nothing."""
+        """What a slider has done is taken back as if it had never been, unless that was nothing."""
         self._look()
         amount = self.work.recipe.amount
         for value in (amount, 0.7 if amount != 0.7 else 0.8):
+            index, entries = self.index, self.entries
             self.work.edit("Amount", amount=value)
             self._did("Amount")
             self._note()
-            back = max(self.index - (value != amount), 0)  # what has grown too large has nothing before it
             self.work.retract()
-            self._turned(back)
+            self._is(index, entries)
             self._look()
 
     @rule()
