@@ -426,22 +426,29 @@ def _perform_many(tasks: Sequence[Piece], jobs: int, cluster: str | None, verbos
     written, repeated = 0, Counter[str]()
     failed: list[Outcome] = []
 
+    def new(label: str, *notices: str) -> list[str]:
+        alike = {said: said.replace(Path(label).stem, NAME) for said in notices}
+        found = [said for said in notices if verbose or alike[said] not in repeated]
+        repeated.update(alike.values())
+        return found
+
+    def warn(label: str, said: str) -> None:
+        _tell(*(_about(label, each) for each in new(label, said)))
+
     def report(outcome: Outcome) -> None:
         nonlocal written
         if outcome.error:
             failed.append(outcome)
         written += not outcome.error
-        alike = {said: said.replace(Path(outcome.label).stem, NAME) for said in outcome.notices}
-        new = [said for said in outcome.notices if verbose or alike[said] not in repeated]
-        repeated.update(alike.values())
         error = outcome.error if verbose or len(failed) == 1 else ""  # the names of those that fail come at the end
-        _tell(*(_about(outcome.label, said) for said in (error, *new, outcome.verdict) if said))
+        said = error, *new(outcome.label, *outcome.notices), outcome.verdict
+        _tell(*(_about(outcome.label, each) for each in said if each))
 
     many = f"{len(tasks)} picture{'s' * (len(tasks) > 1)}"
     alone = jobs == 1 or cluster is not None  # no processes of ours, which would have to be waited for
     try:
         with on_terminal(many, len(tasks), leave if alone else None) as progress:
-            failures = run_batch(tasks, report, progress, jobs, cluster, _tell)
+            failures = run_batch(tasks, report, progress, jobs, cluster, _tell, warn)
     except Cancelled:
         _fail(f"cancelled; {written} of {many} are written, nothing is half-written", INTERRUPTED)
     if not verbose:

@@ -5,11 +5,15 @@ from __future__ import annotations
 import queue
 from collections import deque
 from collections.abc import Callable, Sequence
+from functools import partial
 
 from app.progress import Progress
 from app.work.cluster import run_on_cluster
 from app.work.tasks import Piece
-from app.work.worker import ATTEMPTS, DIED, LOOK, Outcome, Reply, Status, Worker, perform
+from app.work.worker import ATTEMPTS, DIED, LOOK, Outcome, Reply, Status, Warned, Worker, perform
+
+Warn = Callable[[str, str], None]
+"""Is told, with a label, what the user may want to stop a piece of work for."""
 
 
 def run_batch(
@@ -19,6 +23,7 @@ def run_batch(
     jobs: int = 1,
     cluster: str | None = None,
     notice: Callable[[str], None] = lambda said: None,
+    warn: Warn = lambda label, said: None,
 ) -> int:
     """Do all tasks, whatever becomes of any; `report` is called with each outcome. Says how many failed.
 
@@ -26,6 +31,7 @@ def run_batch(
         jobs: processes on this machine.
         cluster: the address of a Dask scheduler, which decides instead.
         notice: is told what is waited for.
+        warn: is told what no outcome says again, before that piece of work takes its time; a cluster's outcomes say it.
 
     Raises:
         UserError: if there is no such scheduler, or it goes; how many are written is said.
@@ -43,18 +49,26 @@ def run_batch(
     if cluster is not None:
         run_on_cluster(tasks, cluster, count, progress, notice)
     elif min(jobs, len(tasks)) > 1:
-        _run_in_processes(tasks, min(jobs, len(tasks)), count, progress)
+        _run_in_processes(tasks, min(jobs, len(tasks)), count, progress, warn)
     else:
         for task in tasks:
-            count(perform(task, Progress(cancel=progress.cancel)))
+            count(perform(task, Progress(cancel=progress.cancel, warn=partial(_warned, warn, task.label))))
     return failures
 
 
-def _run_in_processes(tasks: Sequence[Piece], jobs: int, report: Callable[[Outcome], None], progress: Progress) -> None:
+def _warned(warn: Warn, label: str, said: str) -> bool:
+    warn(label, said)
+    return True
+
+
+def _run_in_processes(
+    tasks: Sequence[Piece], jobs: int, report: Callable[[Outcome], None], progress: Progress, warn: Warn
+) -> None:
     waiting = deque((task, 1) for task in tasks)
     busy: dict[Worker, tuple[Piece, int]] = {}
     idle: list[Worker] = []
     inbox: queue.SimpleQueue[tuple[Worker, Reply]] = queue.SimpleQueue()
+    warned = set[tuple[str, str]]()  # also of pieces whose worker died then, which are done again
     try:
         while waiting or busy:
             # One that has died is tried again when all others are done, alone, with all the memory there is.
@@ -71,6 +85,11 @@ def _run_in_processes(tasks: Sequence[Piece], jobs: int, report: Callable[[Outco
             except queue.Empty:
                 continue
             if isinstance(message, Status) or worker not in busy:
+                continue
+            if isinstance(message, Warned):
+                if (told := (busy[worker][0].label, message.said)) not in warned:
+                    warned.add(told)
+                    warn(*told)
                 continue
             task, attempt = busy.pop(worker)
             if message is not None:

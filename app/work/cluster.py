@@ -15,7 +15,7 @@ from typing import Any
 from app.errors import Cancelled, UserError
 from app.progress import Progress
 from app.work.tasks import Piece
-from app.work.worker import ATTEMPTS, DIED, LOOK, Outcome, Reply, Status, Worker, in_a_line
+from app.work.worker import ATTEMPTS, DIED, LOOK, Outcome, Reply, Status, Warned, Worker, in_a_line
 
 CONNECTING = 10  # seconds that a scheduler has to answer
 WATCHING = 5  # seconds between two looks at whether a scheduler has any worker
@@ -65,11 +65,14 @@ def _perform_on_worker(task: Piece) -> Outcome:
 
 def _outcome_of(inbox: queue.SimpleQueue[tuple[Worker, Reply]], forgotten: Callable[[], bool]) -> Outcome | None:
     """What becomes of the task; None if the worker dies of it. Raises `Cancelled` once nobody wants it."""
+    warnings = list[str]()  # which come with the outcome: nothing else comes from there
     while True:
         with suppress(queue.Empty):
             _, message = inbox.get(timeout=LOOK)
-            if not isinstance(message, Status):
-                return message
+            if isinstance(message, Warned):
+                warnings.append(message.said)
+            elif not isinstance(message, Status):
+                return message and message.after(warnings)
         if forgotten():
             raise Cancelled
 

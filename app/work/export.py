@@ -99,8 +99,6 @@ class _Export:
         self.progress = progress
         self.device = device
         self.pictures = Pictures(job.picture, job.folder, job.frame[0] if job.frame else job.clip, job.named_by)
-        if (said := job.too_fine) and not progress.warn(said):
-            self.pictures.notice(said)
         job.picture.pixels.flags.writeable = False  # so that it stays on the GPU from frame to frame
         playback = job.recipe.time
         # A moving source has no frame that is shown twice: what goes back does so in the simulation.
@@ -122,6 +120,7 @@ class _Export:
         self.dissolves: dict[int, Dissolve] = {}
         self._position: Fraction | None = None
         self._last_shown = Fraction(0)  # where the handles shall have arrived
+        self._has_warned = False
         device.timings.enabled = self.replay.fluid.measuring = self.outputs.stats is not None
 
     def release(self) -> None:
@@ -211,6 +210,7 @@ class _Export:
 
     def _run_until_stopped(self) -> str | None:
         """Simulate until a stop condition fires, or to the end; says which fired."""
+        self._warn()
         for _ in range(self.recipe.ticks):
             self._advance()
             if verdict := self.sentinel.verdict(self.replay.tick, observe(self.replay, self.sentinel)):
@@ -352,6 +352,8 @@ class _Export:
         before = self.replay.tick
         if self.states is not None and begins and self.states.resume(whole):
             self.progress.advance(self.replay.tick - before)
+        if self.replay.tick < position:
+            self._warn()
         while self.replay.tick < whole:
             self._advance()
         self.replay.seek(position)
@@ -472,6 +474,12 @@ class _Export:
 
     def _map_size(self, wanted: MapOutput) -> tuple[int, int]:
         return self.size if wanted.size is None else longer_side(self.size, wanted.size)
+
+    def _warn(self) -> None:
+        """Before the first step that is simulated: where all frames are kept, there is none that could take long."""
+        if not self._has_warned and (said := self.job.too_fine) and not self.progress.warn(said):
+            self.pictures.notice(said)
+        self._has_warned = True
 
     def _advance(self) -> None:
         self.replay.advance()

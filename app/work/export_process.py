@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 from app.work.fit_job import Fit
 from app.work.jobs import Job
-from app.work.worker import Outcome, Reply, Status, Work, Worker
+from app.work.worker import Outcome, Reply, Status, Warned, Work, Worker
 
 
 class WorkProcess:
@@ -33,6 +33,7 @@ class WorkProcess:
         self.error = ""
         self.outcome = Outcome("")
         self._died = died
+        self._warnings = list[str]()
         self._inbox: queue.SimpleQueue[tuple[Worker, Reply]] = queue.SimpleQueue()
         self._worker = Worker(self._inbox)
         # A picture is more than a pipe holds: the window would wait until the other is awake.
@@ -51,8 +52,10 @@ class WorkProcess:
             match self._inbox.get()[1]:
                 case Status(done, state):
                     self.part, self.state = done, state
+                case Warned(said):
+                    self._warnings.append(said)
                 case Outcome() as outcome:
-                    self.is_done, self.error, self.outcome = True, outcome.in_window, outcome
+                    self.is_done, self.error, self.outcome = True, outcome.in_window, outcome.after(self._warnings)
                 case None:
                     self.is_done, self.error = True, self._died
         if self.is_done:

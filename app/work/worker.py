@@ -8,9 +8,9 @@ import queue
 import subprocess
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 from app.errors import Cancelled, UserError
@@ -59,6 +59,10 @@ class Outcome:
     is_met: bool = True
     stopped: bool = False
 
+    def after(self, warnings: Sequence[str]) -> Outcome:
+        """The same where these have not been told before."""
+        return replace(self, notices=(*warnings, *self.notices))
+
 
 @dataclass(frozen=True)
 class Status:
@@ -68,7 +72,14 @@ class Status:
     state: str
 
 
-Reply = Status | Outcome | None
+@dataclass(frozen=True)
+class Warned:
+    """What the user may want to stop a piece of work for, before that takes its time; no outcome says it again."""
+
+    said: str
+
+
+Reply = Status | Warned | Outcome | None
 """What a worker says; None once it has died."""
 
 
@@ -203,7 +214,11 @@ def _told(say: Callable[[Reply], None], cancel: Callable[[], bool]) -> Progress:
         now = Status(now.done, state)
         say(now)
 
-    return Progress(None, report, cancel, tell)
+    def warn(said: str) -> bool:
+        say(Warned(said))
+        return True
+
+    return Progress(None, report, cancel, tell, warn)
 
 
 def _take(waiting: queue.SimpleQueue[Work], finish: threading.Event) -> None:

@@ -52,6 +52,7 @@ point = [0.5, 0.5]
 radius = 0.3
 strength = 5
 """
+FINE = RECIPE.replace("grid = 32", "grid = 388").replace("duration = 0.2", "duration = 0.02")
 
 
 @pytest.fixture
@@ -250,6 +251,22 @@ def test_one_that_fails_does_not_stop_the_others(folder: Path, jobs: int):
     assert contents(folder / "out") == alone(folder, good)
 
 
+def test_a_grid_far_finer_than_a_picture_is_told_before_that_picture_is_done(folder: Path):
+    """It came with the first that was done."""
+    (folder / "a.toml").write_text(FINE)
+    order = list[tuple[str, str]]()
+    run_batch(
+        tasks(folder, [folder / "p0.png", folder / "p1.png"]),
+        lambda outcome: order.append((outcome.label, "".join((*outcome.notices, outcome.error)))),
+        Progress(),
+        warn=lambda label, said: order.append((label, said)),
+    )
+    assert [Path(label).name for label, _ in order] == ["p0.png", "p0.png", "p1.png", "p1.png"]
+    for (_, told), (_, done) in zip(order[::2], order[1::2], strict=True):
+        assert told.startswith("a grid of 388 cells is 6.06 times as fine as the picture of 64 x 48 pixels")
+        assert done == "", "nor is it told again"
+
+
 def test_a_process_that_dies_is_replaced(folder: Path, monkeypatch: pytest.MonkeyPatch):
     """Killed as for want of memory: whatever it had is done by another; what kills each of them is told."""
     monkeypatch.setattr(worker, "SERVING", "import support.dying as d, app.work.worker as w; w.serve(d.dying)")
@@ -317,6 +334,10 @@ def test_the_command_line(folder: Path, fluidwarp: Run):
     ran = render("p2.png", "-o", "out")
     assert (ran.returncode, ran.stdout, ran.stderr) == (0, "", "")
     assert (folder / "out/p2.png").is_file()
+    (folder / "a.toml").write_text(FINE)
+    ran = render("p2.png", "p3.png", "-o", "fine", "--jobs", "2", "--verbose")
+    for line, name in zip(sorted(ran.stderr.splitlines()), ("p2.png", "p3.png"), strict=True):
+        assert line.startswith(f"fluidwarp: {folder / name}: a grid of 388 cells is 6.06 times as fine as the picture")
 
 
 def at_work(folder: Path) -> subprocess.Popen[str]:
@@ -406,7 +427,7 @@ def test_a_cluster_loses_a_worker_and_nothing_else(folder: Path):
     ) as cluster:
         victim, other = cluster.workers[0], cluster.workers[1]
         address = victim.worker_address
-        heard: list[Outcome] = []
+        heard, fine = list[Outcome](), list[Outcome]()
 
         def hear(outcome: Outcome) -> None:
             heard.append(outcome)
@@ -427,10 +448,14 @@ def test_a_cluster_loses_a_worker_and_nothing_else(folder: Path):
             at_work.append([pid for one in cluster.workers.values() for pid in workers(one.pid)])
             return (folder / "q0.0000.png").exists()
 
+        (folder / "b.toml").write_text(FINE)
+        one = spread(order(folder / "b.toml", None, Outputs(folder / "fine")), pictures[:1])
+        run_batch(one, fine.append, Progress(), cluster=cluster.scheduler_address)
         with pytest.raises(Cancelled):
             run_batch(endless, hear, Progress(cancel=has_begun), cluster=cluster.scheduler_address)
         wait_until(lambda: not all(Path(f"/proc/{pid}").exists() for pid in at_work[-1]))
     assert failures == 0, [outcome.error for outcome in heard if outcome.error]
+    assert [said[:24] for outcome in fine for said in outcome.notices] == ["a grid of 388 cells is 4"]
     assert sorted(Path(outcome.label).name for outcome in heard) == sorted(expected)
     written = {name: data for name, data in contents(folder / "out").items() if not name.startswith(".")}
     assert written == expected  # what was killed in the middle of writing may have left its hidden file

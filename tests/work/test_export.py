@@ -91,11 +91,14 @@ def test_a_grid_far_finer_than_the_picture_is_told_before_it_takes_its_time(devi
         order.append(said)
         return hears
 
-    progress = Progress(warn=warn, report=lambda done, total: order.append("step"))
+    def step(done: int, total: int | None) -> None:
+        if done:
+            order.append("step")
+
     for cells, is_told, hears in (384, False, True), (388, True, True), (388, True, False):
         order.clear()
         recipe = Recipe.parse(WHIRL).on_grid(cells).edited(duration=0.02)
-        report = run(device, Job(recipe, small, tmp_path, outputs), progress)
+        report = run(device, Job(recipe, small, tmp_path, outputs), Progress(warn=warn, report=step))
         said = "a grid of 388 cells is 4.04 times as fine as the picture of 96 x 64 pixels, and takes long; "
         said += "one of 96 is as fine"
         assert list(report.notices) == [said] * (is_told and not hears), "with the result, if nobody heard of it before"

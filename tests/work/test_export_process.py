@@ -10,7 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from app.media.pictures import read_picture
+from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.work.export_process import ExportProcess
 from app.work.jobs import Job, Outputs
@@ -73,6 +76,15 @@ def test_a_picture_larger_than_a_pipe_is_exported(tmp_path: Path):
     process = ended(ExportProcess(Job(recipe, read_picture(PICTURE), tmp_path, Outputs(tmp_path / "out.png"))))
     assert process.error == ""
     assert (read_picture(tmp_path / "out.png").pixels == read_picture(PICTURE).pixels).all()
+
+
+def test_what_is_told_before_the_work_is_among_its_notices(tmp_path: Path):
+    force = "[[force]]\nkind = 'vortex'\npoint = [0.5, 0.5]\nradius = 0.3\nstrength = 5\n"
+    recipe = Recipe.parse(f"duration = 0.02\n[fluid]\ngrid = 388\n{force}")
+    small = Picture(np.zeros((48, 64, 3), np.uint8))
+    process = ended(ExportProcess(Job(recipe, small, tmp_path, Outputs(tmp_path / "out.png"))))
+    (said,) = process.notices
+    assert said.startswith("a grid of 388 cells is 6.06 times as fine as the picture")
 
 
 def test_nobody_waits_for_one_that_is_stopped_also_while_its_process_is_getting_it(tmp_path: Path):

@@ -281,6 +281,18 @@ def test_what_is_kept_says_nothing_of_handles_that_are_on_their_way(folder: Path
         assert fluidwarp(folder, *words).stderr == f"fluidwarp: {kept} of 5 frames were whole and are kept\n"
 
 
+def test_where_nothing_is_simulated_nothing_takes_long(folder: Path, fluidwarp: Run):
+    """A grid far finer than the picture was told to take long also where all frames are kept."""
+    force = "[[force]]\nkind = 'vortex'\npoint = [0.5, 0.5]\nradius = 0.3\nstrength = 5\n"
+    (folder / "a.toml").write_text(f"duration = 0.02\n[fluid]\ngrid = 388\ndt = 0.02\n[output]\nfps = 50\n{force}")
+    write_picture(folder / "p.png", Picture((plate(1) * 255).astype(np.uint8)))
+    words = ["render", "a.toml", "p.png", "-o", "w.%02d.png", "--resume"]
+    assert "times as fine as the picture" in fluidwarp(folder, *words).stderr
+    assert fluidwarp(folder, *words).stderr == "fluidwarp: 2 of 2 frames were whole and are kept\n"
+    (folder / "w.00.png").unlink()  # which is the picture itself
+    assert fluidwarp(folder, *words).stderr == "fluidwarp: 1 of 2 frames were whole and are kept\n"
+
+
 def test_a_damaged_record_costs_no_more_than_the_work(folder: Path, fluidwarp: Run):
     words = ["render", "a.toml", "plate.%04d.exr", "-o", "w.%04d.exr"]
     assert fluidwarp(folder, *words).returncode == 0
