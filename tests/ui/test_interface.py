@@ -16,12 +16,15 @@ from imgui_bundle import imgui
 from app.media.displacement import Displacement
 from app.media.maps import write_map
 from app.media.pictures import write_picture
+from app.model.handles import RecipeHandle
+from app.model.masks import PathFreeze
 from app.model.picture import Picture
 from app.model.presets import PUTTY, WATER
 from app.model.tools import TOOL, TOOLS, Press
 from app.ui.chooser import FileChooser
 from app.ui.clock import FRAMES, HOVERING, PACE
 from app.ui.editor import Editor
+from app.ui.editor_state import SELECT_BY
 from app.ui.events import LEFT, Button, Event, Key, Mods, Move, Text, Wheel
 from app.ui.export_choices import ANIMATION
 from app.ui.export_dialog import ExportDialog
@@ -375,6 +378,37 @@ def test_the_first_hint_is_one_row(robot: Robot, monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(Ui, "text", noting)
     robot.frame()
     assert rows["Drag"] == pytest.approx(rows["Drop"], abs=1)
+
+
+def test_a_hint_is_of_the_tool_in_hand(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    """ "Drag on the picture to push it." stood there with each: with handles, and where only the view is moved."""
+    said, text = list[str](), Ui.text
+    monkeypatch.setattr(
+        Ui, "text", lambda ui, words, *given, **named: (said.append(words.strip()), text(ui, words, *given, **named))
+    )
+    robot.size = (1280, 800)
+    handle = RecipeHandle(at=(0.4, 0.5), to=(0.45, 0.5), duration=0.1)
+    robot.editor.session.edit(
+        "Handle", handle=(handle,), freeze=(PathFreeze(kind="path", points=((0.2, 0.2),), radius=0.1),)
+    )
+    robot.rest()
+    shows_legend = {"thicken", "smooth"}  # in the place of a hint
+    hints = {"push": "Drag on the picture to push it.", "select": SELECT_BY["rectangle"]}
+    for tool in TOOLS:
+        robot.editor.state.choose_tool(tool.name, False)
+        robot.frame(count=2)
+        said.clear()
+        robot.frame()
+        own = hints.get(tool.name, f"{tool.hint}.")
+        is_there = tool.name in hints or (tool.gesture is not None and tool.name not in shows_legend)
+        known = {*hints.values(), *(f"{each.hint}." for each in TOOLS)}
+        assert known & {*said} == ({own} if is_there else set()), tool.name
+    robot.editor.state.choose_tool("handle", False)
+    robot.size = (560, 500)
+    robot.frame(count=2)
+    said.clear()
+    robot.frame()
+    assert not any(words.startswith("Drag a point") for words in said), "where there is no room for it"
 
 
 @pytest.mark.parametrize("typed", ["nan", "banana", ""])

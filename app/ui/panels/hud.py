@@ -6,6 +6,7 @@ from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
 from app.model.recipe import Recipe
+from app.model.tools import Tool
 from app.ui.actions import Do
 from app.ui.clock import Clock
 from app.ui.editor_state import EditorState
@@ -20,6 +21,7 @@ from app.ui.workspace import Workspace
 from app.work.session import Session
 
 ZOOM, HINT = 160.0, 260.0  # points of the canvas's width that what lies on it needs
+BESIDE = 84.0  # and what lies beside the words of the first hint
 LOW = 160.0  # and of its height up to which hints would lie over what they are about
 LEGEND = ((-1, "0.1x"), (0, "1x"), (1, "10x"), (2, "100x"), (3, "1000x"))
 """Decades of viscosity, and what they are called; their tints are those of canvas.frag."""
@@ -50,8 +52,8 @@ def draw(
     has_legend = state.shows_viscosity and not state.before and canvas.width > ui.px(HINT)
     if how and not is_covered and has_room:
         _how(ui, canvas, how)
-    elif preferences.hint and not how and has_room and not has_legend and not state.statistics:
-        _hint(ui, canvas, preferences)
+    elif preferences.hint and state.tool.gesture and not how and has_room and not has_legend and not state.statistics:
+        _hint(ui, canvas, state.tool, preferences)
     if has_legend:
         _legend(ui, canvas, state.overlays["viscosity"].opacity)
     if state.statistics:
@@ -116,16 +118,23 @@ def _how(ui: Ui, canvas: Rect, words: str) -> None:
         imgui.pop_text_wrap_pos()
 
 
-def _hint(ui: Ui, canvas: Rect, preferences: Preferences) -> None:
+def _hint(ui: Ui, canvas: Rect, tool: Tool, preferences: Preferences) -> None:
+    """What the tool in hand does, if there is room for it; until something has been painted."""
+    words = "Drag on the picture to push it." if tool.name == "push" else f"{tool.hint}."
+    imgui.push_font(ui.fonts.bold, 14.0)
+    width = imgui.calc_text_size(words).x + ui.px(BESIDE)
+    imgui.pop_font()
+    if canvas.width < width:
+        return
     # Beside the zoom, or above it.
-    bottom = canvas.bottom - ui.px(14 if canvas.width > ui.px(HINT + 2 * ZOOM) else 54)
+    bottom = canvas.bottom - ui.px(14 if canvas.width > width + ui.px(2 * ZOOM) else 54)
     with ui.floating("hint", canvas.x + canvas.width / 2, bottom, (0.5, 1), 0.9):
         top = imgui.get_cursor_pos_y()
         imgui.dummy(ImVec2(ui.px(4), ui.px(24)))
         imgui.same_line(0, 0)
         imgui.set_cursor_pos_y(top + ui.px(4))
-        ui.text("Drag on the picture to push it.", size=14, bold=True)
-        if canvas.width > ui.px(860) and not preferences.recent:
+        ui.text(words, size=14, bold=True)
+        if canvas.width > width + ui.px(600) and not preferences.recent:
             imgui.same_line(0, ui.px(8))
             imgui.set_cursor_pos_y(top + ui.px(4))
             ui.dim(f"Drop your own picture here, or press {ui.shown('ctrl+o')}.", 14)
