@@ -188,6 +188,29 @@ def test_a_keyframe_does_not_keep_a_turn_from_being_changed_while_it_is_made(rob
     assert session.recipe.handle[0].turned == ()
 
 
+def test_what_a_slider_is_dragged_to_is_seen_before_it_is_let_go_of(robot: Robot, widgets: Widgets) -> None:
+    """And is an edit only then."""
+    session, state = robot.editor.session, robot.editor.state
+    session.edit("Handle", handle=(RecipeHandle(at=(0.4, 0.5), to=(0.45, 0.5), duration=0.1),), duration=1.0)
+    state.selected = "handle[1]"
+    state.sections = {"handles": True, "fluid": True}
+    robot.rest()
+    for label in ("Size", "Stiffness", "Local", "Rotate", "Scale", "Viscosity", "Drag", "Amount"):
+        widgets.look()
+        entries, index, before = session.document.history.entries, session.document.history.index, session.recipe
+        rect = next(each.rect for each in widgets.drawn if each.words == label and each.window != "bar")
+        robot.move(*rect.middle)
+        robot.press()
+        robot.move(rect.x + 0.4 * rect.width, rect.middle[1])
+        robot.frame()
+        assert session.recipe.edited(duration=1.0) != before.edited(duration=1.0), label
+        assert session.document.history.entries == entries
+        robot.release()
+        assert session.document.history.index == index + 1, label
+        session.undo()
+        session.settle()
+
+
 @pytest.mark.parametrize("label", ["Rotate", "Scale"])
 @pytest.mark.parametrize("turned", [(), ((0.1, 0.0, 1.0), (0.9, 30.0, 2.0))])
 def test_a_double_click_on_what_was_never_turned_is_no_edit(

@@ -1082,3 +1082,19 @@ def test_keys_go_through_widgets_while_a_dialog_is_open_and_no_longer(robot: Rob
         robot.frame(count=3)
         seen.append(bool(imgui.get_io().config_flags & through))
     assert seen == [False, True, False, True, False]
+
+
+def test_a_tool_that_is_chosen_by_its_key_is_brought_into_view(robot: Robot, widgets: Widgets) -> None:
+    robot.size = (200, 300)  # too narrow for more columns
+    widgets.look()
+
+    def place(name: str) -> Rect:
+        return next(each.rect for each in widgets.drawn if each.kind == "icon_button" and each.words == name)
+
+    strip = robot.editor.layout.strip
+    assert place("zoom").y > strip.bottom
+    robot.key("z")
+    robot.frame(count=2)
+    widgets.look()
+    assert strip.y <= place("zoom").y
+    assert place("zoom").bottom <= strip.bottom

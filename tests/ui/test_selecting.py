@@ -333,10 +333,10 @@ def test_its_key_goes_through_what_can_be_selected_by(robot: Robot) -> None:
 def test_a_selection_thickens_with_what_the_slider_says(robot: Robot, widgets: Widgets) -> None:
     masks = robot.editor.session.replay.masks
     widgets.click("Thickness")
-    widgets.type("Fill with", "1000")
+    widgets.type("Fill with", "300")
     select(robot, "rectangle", (0.1, 0.1), (0.5, 0.5))
     widgets.click("Fill")
-    assert masks.thickness.get().max() == 24576 + 3 * 8192
+    assert masks.thickness.get().max() == pytest.approx(24576 + 8192 * np.log10(300), abs=8)
     widgets.click("Clear")
     assert (masks.thickness.get() == 24576).all()
 
