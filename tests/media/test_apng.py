@@ -138,6 +138,10 @@ def test_what_is_cleared_is_transparent_though_no_frame_is(tmp_path: Path):
 def test_an_animation_has_alpha_only_where_something_is_seen_through(tmp_path: Path):
     whole, part = np.full((HEIGHT, WIDTH, 4), 255), np.full((4, 4, 4), 255)
     clear = part - [0, 0, 0, 255]
+    pierced = np.full((6, 8, 4), 255)
+    pierced[1:5, 2:6, 3] = 0
+    patch = pierced.copy()
+    patch[..., 3] = 255 - pierced[..., 3]
     for parts, seen in {
         "whole": ([(0, 0, whole, 1, 0), (0, 0, whole, 0, 0)], False),
         "left bare": ([(0, 0, whole, 1, 0), (0, 0, part, 0, 0)], True),
@@ -150,6 +154,8 @@ def test_an_animation_has_alpha_only_where_something_is_seen_through(tmp_path: P
         "see-through": ([(0, 0, whole, 0, 0), (2, 2, clear, 0, 0)], True),
         "laid over": ([(0, 0, whole, 0, 0), (2, 2, clear, 0, 1)], False),
         "laid over what is cleared": ([(0, 0, whole, 0, 0), (2, 2, part, 1, 0), (2, 2, clear, 0, 1)], True),
+        "patched": ([(0, 0, whole, 0, 0), (4, 3, part, 1, 0), (2, 2, patch, 0, 1)], False),
+        "patched all around": ([(0, 0, whole, 0, 0), (4, 3, part, 1, 0), (2, 2, pierced, 0, 1)], True),
         "cleared again": ([(0, 0, whole, 0, 0), (2, 2, part, 1, 0), (2, 2, part, 2, 0), (9, 2, part, 0, 0)], True),
     }.values():
         found = apng.read(encoded(parts))

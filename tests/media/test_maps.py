@@ -251,13 +251,16 @@ def test_a_map_of_other_proportions_is_refused_by_its_header(tmp_path: Path, end
         read_map(path, picture=(640, 320))
 
 
-def test_a_tiff_map_on_its_side_is_for_the_picture_it_is_turned_to(tmp_path: Path):
-    tifffile.imwrite(
-        tmp_path / "m.tif", np.full((8, 6, 3), 0.5, np.float32), photometric="rgb", extratags=[(274, "H", 1, 6, True)]
-    )
-    assert read_map(tmp_path / "m.tif", picture=(16, 12)).width == 8
-    with pytest.raises(UserError, match="it is 8 x 6 and the picture 12 x 16"):
-        read_map(tmp_path / "m.tif", picture=(12, 16))
+@pytest.mark.parametrize("orientation", range(1, 9))
+def test_a_tiff_map_is_for_the_picture_it_is_turned_to(tmp_path: Path, orientation: int):
+    (lying, standing), size = ((12, 16), (16, 12)), (6, 8)
+    if orientation > 4:  # on its side
+        lying, standing, size = standing, lying, size[::-1]
+    tag = (274, "H", 1, orientation, True)
+    tifffile.imwrite(tmp_path / "m.tif", np.full((8, 6, 3), 0.5, np.float32), photometric="rgb", extratags=[tag])
+    assert read_map(tmp_path / "m.tif", picture=lying).width == size[0]
+    with pytest.raises(UserError, match=f"it is {size[0]} x {size[1]} and the picture {standing[0]} x {standing[1]}"):
+        read_map(tmp_path / "m.tif", picture=standing)
 
 
 def test_a_picture_of_another_kind_with_the_ending_of_a_tiff_is_told(tmp_path: Path):

@@ -535,13 +535,25 @@ def test_what_is_nowhere_cannot_be_turned_round_or_flow(folder: Path, fluidwarp:
     assert (ran.returncode, "1 of its pixels are NaN" in ran.stderr) == (1, True)
 
 
-def test_what_of_a_sequence_is_not_used_is_told(folder: Path):
-    assert open_source(folder / "plate.####.exr").picture.note == ""
-    assert open_source(folder / "plate.####.exr", animated=False).picture.note == (
-        "plate.####.exr: of its 4 frames only the first is used"
+@pytest.mark.parametrize("name", ["plate.", "plate (2) [a+b]."])
+def test_what_of_a_sequence_is_not_used_is_told(folder: Path, name: str):
+    for path in folder.glob("plate.*"):
+        path.rename(folder / path.name.replace("plate.", name))
+    assert open_source(folder / f"{name}####.exr").picture.note == ""
+    assert open_source(folder / f"{name}####.exr", animated=False).picture.note == (
+        f"{name}####.exr: of its 4 frames only the first is used"
     )
-    (folder / "plate.-001.exr").touch()
-    (folder / "plate.-002.exr.txt").touch()
-    assert open_source(folder / "plate.####.exr").picture.note == (
-        "plate.####.exr: of 1 files with numbers below 0 none is used"
+    (folder / f"{name}-001.exr").touch()
+    (folder / f"{name}-002.exr.txt").touch()
+    assert open_source(folder / f"{name}####.exr").picture.note == (
+        f"{name}####.exr: of 1 files with numbers below 0 none is used"
     )
+
+
+def test_a_sequence_of_one_file_is_a_clip_only_where_an_animation_is_made(folder: Path):
+    for number in (1002, 1003, 1004):
+        (folder / f"plate.{number}.exr").unlink()
+    still, moving = (open_source(folder / "plate.####.exr", animated=animated) for animated in (False, True))
+    assert (still.clip, still.picture.note) == (None, "")
+    assert moving.clip is not None
+    assert np.array_equal(still.picture.pixels, moving.picture.pixels)
