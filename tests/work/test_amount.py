@@ -160,6 +160,17 @@ def test_it_is_the_same_whichever_way_a_tick_is_reached(device: Device) -> None:
     replay.release()
 
 
+def test_what_is_seen_is_as_much_as_the_recipe_says(device: Device) -> None:
+    replay = at_end(device, TURNED)
+    for amount in (0.0, 0.5, 1.0, 1.01, 1.5):
+        replay.use(TURNED.edited(amount=amount))
+        part = ScaledMap(replay.warp, amount)
+        assert np.array_equal(replay.seen.read(), part.read()), amount
+        assert np.array_equal(replay.seen.read(), replay.warp.read()) == (amount == 1), amount
+        part.release()
+    replay.release()
+
+
 def test_the_command_line_takes_an_amount(fluidwarp: Run, tmp_path: Path) -> None:
     write_picture(tmp_path / "picture.png", PICTURE)
     whole = TURNED.on_grid(48).edited(picture="picture.png")

@@ -98,6 +98,19 @@ def moments(shared_device: Device) -> list[bytes]:
     return seen
 
 
+def test_going_back_past_a_change_of_viscosity_takes_what_masks_are_painted_on_along(
+    replay: Replay, moments: list[bytes]
+):
+    """A brush thickens at ticks 8 to 14, and at 15 all of the fluid becomes thicker."""
+    for tick in range(LAST + 1):
+        replay.seek(tick)
+        replay.checkpoint()
+    for tick in range(LAST, 0, -1):
+        replay.seek(tick - 1)
+        replay.advance()
+        assert moment(replay) == moments[tick]
+
+
 def test_going_anywhere_gives_the_same_bytes(replay: Replay, moments: list[bytes]):
     rng = random.Random(1)
     for _ in range(4):

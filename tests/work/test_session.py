@@ -859,6 +859,20 @@ def test_what_was_previewed_and_dropped_sends_the_playhead_nowhere_later(session
     assert (session.target, session.recipe.amount) == (end, 1.0)
 
 
+def test_nothing_moves_while_what_changes_the_fluid_from_here_on_is_dragged(session: Session) -> None:
+    paint(session, "push", (0.4, 0.5), (0.6, 0.5))
+    session.advance(1)
+    assert session.coasting
+    for viscosity in (0.5, 0.4, 0.3):
+        session.preview_change(viscosity=viscosity)
+        assert not session.coasting
+        assert not session.playing
+        end = session.end
+        session.settle()
+        assert not session.is_moving
+        assert (session.tick, session.end) == (end, end)
+
+
 @pytest.mark.parametrize("ticks", [0, 3])
 def test_the_amount_is_an_edit_of_its_own_while_the_fluid_coasts(session: Session, ticks: int) -> None:
     """It is dragged while the recording goes on, which is no part of it, as it is none of the recording."""
