@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import json
 import os
+import queue
 import re
 import signal
 import socket
@@ -35,7 +36,7 @@ from app.work.batch import run_batch
 from app.work.jobs import MapOutput, Outputs
 from app.work.replay import Replay
 from app.work.tasks import Edits, Task, named, spread
-from app.work.worker import Outcome, perform
+from app.work.worker import Outcome, Status, perform
 from solver.gl.context import NoSuchDevice
 from solver.gl.device import Device
 from support.commands import Run
@@ -407,6 +408,24 @@ def test_stopping_all_processes_at_once(folder: Path, number: signal.Signals, mo
     left = {*contents(folder)} - before
     assert all(name.startswith(".") for name in left)
     assert len(left) <= (moment == "a worker was killed")  # what is killed outright cannot clean up after itself
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP])
+def test_what_a_terminal_tells_all_of_its_processes_the_ones_that_work_do_not_hear(
+    folder: Path, number: signal.Signals
+):
+    """The one that waits for them hears it, and says what becomes of them."""
+    inbox, before = queue.SimpleQueue[Any](), {*workers(os.getpid())}
+    one = worker.Worker(inbox)
+    (pid,) = {*workers(os.getpid())} - before
+    os.kill(pid, number)
+    one.begin(order(folder / "a.toml", folder / "p0.png", Outputs(folder / "out.png")))
+    while isinstance(said := inbox.get(timeout=60)[1], Status):
+        os.kill(pid, number)
+    one.end()
+    assert said is not None
+    assert said.error == ""
+    assert (folder / "out.png").exists()
 
 
 # A cluster ----------------------------------------------------------------------------------------------------------

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from app.errors import UserError
+from app.errors import Cancelled, UserError
 from app.gallery.measures import sharpness, spline_warp
 from app.media import ffmpeg
 from app.media.auxiliary import Pictures
@@ -34,6 +34,7 @@ from app.model.picture import Picture, srgb_to_linear
 from app.model.recipe import Recipe
 from app.model.timeline import Timeline
 from app.progress import Progress
+from app.work import export
 from app.work.apply_job import Application, MapSource, converted, inverted
 from app.work.export import Target, displacement, looked_up, run, shown_positions, writers_for
 from app.work.jobs import Job, MapOutput, Outputs
@@ -437,6 +438,22 @@ def test_the_size_of_the_gpu_does_not_bound_a_map(device: Device, picture: Path)
     pieces = displacement(replay, (WIDTH, HEIGHT), overscan=1).values[1:-1, 1:-1]
     replay.release()
     assert np.abs(whole - pieces).max() < 1e-7
+
+
+def test_a_map_that_is_found_in_pieces_can_be_given_up_before_each(
+    device: Device, picture: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(export, "POINTS_AT_ONCE", 4 * (WIDTH + 2))
+    replay, asked = replayed(device, WHIRL, picture, 1), list[int]()
+
+    def check() -> None:
+        asked.append(1)
+        if len(asked) == 3:
+            raise Cancelled
+
+    with pytest.raises(Cancelled):
+        displacement(replay, (WIDTH, HEIGHT), overscan=1, check=check)
+    replay.release()
 
 
 def test_a_recipe_begins_with_a_map(device: Device, picture: Path, tmp_path: Path):
