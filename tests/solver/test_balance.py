@@ -34,6 +34,15 @@ def test_what_is_within_bounds_is_least_squares(influence: np.ndarray):
     )
 
 
+def test_each_does_its_share_where_all_are_within_bounds(influence: np.ndarray):
+    """By (H3) in another order: W K' (K W K' + s)^-1 = (K' K + s W^-1)^-1 K'."""
+    rng, each = np.random.default_rng(2), np.arange(16)
+    wanted, shares = rng.normal(size=16), rng.uniform(0.1, 2, 16)
+    weighed = Balance(influence, np.full(16, 1e-2), shares, (each, each), np.full(8, np.inf))
+    inner = influence.T @ influence + 1e-2 * np.diag(1 / shares)
+    np.testing.assert_allclose(weighed.strengths(wanted), np.linalg.solve(inner, influence.T @ wanted), rtol=1e-6)
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_pushes_beside_those_at_their_bounds_make_up_for_them(seed: int, influence: np.ndarray):
     """More is done than by cutting off what is too strong, or all in proportion."""

@@ -629,6 +629,7 @@ def test_devices_beside_each_other_do_not_mix(device: Device) -> None:
         steered = Brush(device), Push(Tip((0.3, 0.3), (0.4, 0.3), 0.1), 0.1)
         with pytest.raises(FieldError, match="another device"):
             there.step(0.1, (), lambda faces: steered[0].make_up(there, steered[1], faces))
+    other.release()  # which the block has done
     here.step(0.1)
     assert np.isfinite(here.u).all()
     with pytest.raises(ContextError, match="released"):

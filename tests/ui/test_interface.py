@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -1045,14 +1046,20 @@ def test_every_button_that_shows_a_key_does_what_the_key_does(robot: Robot, monk
     assert {"undo", "split", "inspector", "fit", "actual", "zoom_in", "zoom_out", "lanes", "play"} <= by_action
 
 
-def test_the_statistics_are_of_the_map_also_before_the_first_step(
+def test_the_statistics_are_of_the_map_before_the_first_step_and_of_steps_after_it(
     robot: Robot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    words, dim = list[str](), Ui.dim
-    monkeypatch.setattr(Ui, "dim", lambda ui, text, *more, **named: (words.append(text), dim(ui, text, *more, **named)))
+    words, text = list[str](), Ui.text  # which dim words go through
+    monkeypatch.setattr(
+        Ui, "text", lambda ui, said, *more, **named: (words.append(said), text(ui, said, *more, **named))
+    )
     robot.key("ctrl+i")
     robot.frame(count=3)
     assert "det J  1.00 to 1.00    folds 0" in words
+    assert not [said for said in words if said.startswith("Step")]
+    robot.drag((0.4, 0.5), (0.5, 0.5))
+    robot.rest()
+    robot.until(lambda: any(re.fullmatch(r"Step  \d+\.\d ms", said) for said in words))
 
 
 def test_a_drag_goes_on_when_a_panel_comes_up(robot: Robot, widgets: Widgets) -> None:
