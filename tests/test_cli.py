@@ -793,8 +793,8 @@ def test_interrupted_leaves_nothing(folder: Path, words: list[str]):
     _, told = started.communicate(timeout=60)  # of a job of hours
     assert started.returncode == cli.INTERRUPTED
     assert told.endswith("fluidwarp: cancelled; nothing half-written is left\n")
-    # of a grid that is far finer than the picture
-    assert told.count("\n") == 1 + ("--states" in words) == 1 + told.count("takes long")
+    # of a grid that is far finer than the picture, if it came to the first step
+    assert told.count("\n") == 1 + told.count("takes long") <= 1 + ("--states" in words)
     assert here(folder) == before
 
 

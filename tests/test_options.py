@@ -156,7 +156,7 @@ def asked(tmp_path: Path, fluidwarp: Run, monkeypatch: pytest.MonkeyPatch) -> Ca
     def convert(source: apply_job.MapSource, output: Path, kind: str, invert: bool, progress: object) -> None:
         hear(flat(source, "maps.") | {"output": output, "kind": kind, "invert": invert})
 
-    def several(tasks: Any, report: object, progress: object, jobs: int, cluster: str | None, notice: object) -> None:
+    def several(tasks: Any, report: object, progress: object, jobs: int, cluster: str | None, *told: object) -> None:
         hear(flat(tasks[0]) | {"jobs": jobs, "cluster": cluster, "count": len(tasks)})
 
     def fit(job: FitJob, device: object, progress: Progress) -> None:
