@@ -211,9 +211,7 @@ def test_full_graphics_memory_is_told_and_what_is_given_back_can_be_used(tmp_pat
         command = [sys.executable, "-c", FULL + script]
         ran = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, env=environment)
         assert (ran.returncode, ran.stdout.strip()) == (status, told), ran.stderr
-    finer, full = ran.stderr.splitlines()
-    assert full == "fluidwarp: there is not enough memory; try a smaller --size or --grid"
-    assert "a grid of 4096 cells is 6.83 times as fine as the picture" in finer
+    assert ran.stderr == "fluidwarp: there is not enough memory; try a smaller --size or --grid\n"
     assert not list(tmp_path.iterdir())
 
 
