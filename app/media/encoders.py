@@ -52,7 +52,7 @@ class Stream:
 
     @property
     def is_shallow(self) -> bool:
-        """Of a high dynamic range in 8 bits: codecs that keep the depth are no mend for what has too few."""
+        """Of a high dynamic range in 8 bits; a codec that keeps the depth writes too few bits for that."""
         return self.colours.is_high and self.bits == 8
 
     @property

@@ -37,7 +37,7 @@ class History:
         self.budget = budget
         self._entries = [Entry("Open", recipe, _own_bytes(recipe, None))]
         self._index = self._made = 0
-        # The entries before the last commit, and which was the present; None once something else has been done.
+        # The entries and the index before the last commit, for `retract`; None once that can no longer be taken back.
         self._before: tuple[list[Entry], int] | None = None
 
     @classmethod

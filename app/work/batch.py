@@ -31,7 +31,8 @@ def run_batch(
         jobs: processes on this machine.
         cluster: the address of a Dask scheduler, which decides instead.
         notice: is told what is waited for.
-        warn: is told what no outcome says again, before that piece of work takes its time; a cluster's outcomes say it.
+        warn: is told that a piece of work takes long, before it does, and its outcome does not say so again; on a
+            cluster only the outcome says it.
 
     Raises:
         UserError: if there is no such scheduler, or it goes; how many are written is said.

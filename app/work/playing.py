@@ -146,7 +146,7 @@ class Playing(Editing):
             self._record()
 
     def retract(self) -> None:
-        """Take back what was committed last, unless it had changed nothing, as if it had never been: it is no Redo.
+        """Take back what was committed last, if it changed anything, as if it had never been: it cannot be redone.
 
         The playhead stays where it is, or goes back to where a setting was changed: the hand goes on with that there.
         What has been played all along, as with the amount, plays on, and fluid that has coasted coasts on.

@@ -60,7 +60,7 @@ class Outcome:
     stopped: bool = False
 
     def after(self, warnings: Sequence[str]) -> Outcome:
-        """The same where these have not been told before."""
+        """The same with these warnings before its notices, where nobody has been told of them yet."""
         return replace(self, notices=(*warnings, *self.notices))
 
 

@@ -42,7 +42,7 @@ def read(data: bytes) -> Animation | None:
                 kept.append((kind, body))
     if control is not None:
         frames.append(_frame(control, head, kept, pieces))
-    if told[0] < 2:  # or it does not say that it is one, as whatever frames it has are passed over then
+    if told[0] < 2:  # whatever frames it has: without being told of two, browsers show a still
         return None
     if len(frames) < told[0]:
         raise ValueError(f"it has {len(frames)} of its {told[0]} frames")

@@ -21,8 +21,8 @@ from app.ui.workspace import Workspace
 from app.work.session import Session
 
 ZOOM, HINT = 160.0, 260.0  # points of the canvas's width that what lies on it needs
-BESIDE = 84.0  # and what lies beside the words of the first hint
-LOW = 160.0  # and of its height up to which hints would lie over what they are about
+LOW = 160.0  # points of its height up to which hints would lie over what they are about
+BESIDE = 84.0  # points that the first hint needs beside its words
 LEGEND = ((-1, "0.1x"), (0, "1x"), (1, "10x"), (2, "100x"), (3, "1000x"))
 """Decades of viscosity, and what they are called; their tints are those of canvas.frag."""
 THICK, THIN, GREY = (0.80, 0.30, 0.62, 1.0), (0.34, 0.71, 0.91, 1.0), (0.5, 0.5, 0.5, 1.0)
