@@ -61,7 +61,7 @@ def machine(
     monkeypatch: pytest.MonkeyPatch, headless: dict[str, Any], window: dict[str, Any], devices: int = 0,
     **environment: str,
 ) -> None:  # fmt: skip
-    """What processes answer on a machine, and what is set there."""
+    """Let processes answer, and the environment be, as on such a machine."""
 
     def answer(module: str, **given: str) -> dict[str, Any]:
         if module == "app.ui.probe":
@@ -97,7 +97,7 @@ def test_all_that_is_well_is_told_with_what_it_is(monkeypatch: pytest.MonkeyPatc
 
 
 def test_every_library_that_is_needed_is_looked_for() -> None:
-    """But for those without which there is no command line to ask."""
+    """But for those without which the command line does not start."""
     needed = {re.split("[>; ]", each)[0] for each in metadata.requires("fluidwarp") or () if "extra ==" not in each}
     assert sorted(doctor.LIBRARIES) == sorted(needed - {"typer", "rich"})
 
@@ -175,7 +175,7 @@ def test_the_command_marks_what_is_missing_and_fails_for_what_is_vital(
 def test_what_a_driver_says_in_brackets_is_printed_as_it_is(
     tmp_path: Path, fluidwarp: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """And not taken for a mark of ours."""
+    """And not taken for markup."""
     machine(monkeypatch, WELL | {"renderer": "[red]Card[/]"}, {"error": "[bold]"}, DISPLAY="[/]")
     told = fluidwarp(tmp_path, "doctor").stdout
     assert all(words in told for words in ("[red]Card[/] (Maker)", "[bold]", "(DISPLAY=[/])"))

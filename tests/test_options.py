@@ -1,4 +1,4 @@
-"""Every option of the command line reaches what is asked for, alone and unchanged; and every word that is none."""
+"""Every option of the command line changes its own part of the order and nothing else; other values are refused."""
 
 from __future__ import annotations
 
@@ -126,13 +126,14 @@ WAYS: dict[str, tuple[str, dict[str, tuple[str, dict[str, Any]]]]] = {
         },
     ),
 }
-"""Of each command words that do, and of each of its options some more, with what is another thing then."""
+"""Of each command: words that are enough for it, and for each of its parameters more words, with the fields of the
+order that these change."""
 
 SEVERAL = {"render": "a.toml cat.png dog.png -o out", "apply": "m.npy cat.png dog.png -o out"}
 
 
 def flat(order: object, above: str = "") -> dict[str, Any]:
-    """The fields of what is asked for, by their names, those of its parts with these before them."""
+    """The fields of an order by their names; those of a part have the name of that part before theirs."""
     found: dict[str, Any] = {}
     for each in fields(order):  # pyright: ignore[reportArgumentType]
         value = getattr(order, each.name)
@@ -142,7 +143,7 @@ def flat(order: object, above: str = "") -> dict[str, Any]:
 
 @pytest.fixture
 def asked(tmp_path: Path, fluidwarp: Run, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], dict[str, Any]]:
-    """What a command line asks for, which nobody does."""
+    """The order that a command line gives, as `flat` has it; nothing of it is carried out."""
     write_picture(tmp_path / "cat.png", Picture(np.zeros((48, 64, 3), np.uint8)))
     write_picture(tmp_path / "dog.png", Picture(np.zeros((48, 64, 3), np.uint8)))
     write_map(tmp_path / "m.npy", Displacement(np.zeros((48, 64, 2), np.float32)))
@@ -169,7 +170,7 @@ def asked(tmp_path: Path, fluidwarp: Run, monkeypatch: pytest.MonkeyPatch) -> Ca
     monkeypatch.setattr(batch, "run_batch", several)
 
     def ask(line: str) -> dict[str, Any]:
-        monkeypatch.setenv(GPU, "")  # so that it is taken back what the command line sets
+        monkeypatch.setenv(GPU, "")  # so that what the command line sets is undone after the test
         monkeypatch.delenv(GPU)
         ran = fluidwarp(tmp_path, *line.split())
         assert (ran.returncode, ran.stderr, len(heard)) == (1, "fluidwarp: that is all\n", 1), line
@@ -179,7 +180,7 @@ def asked(tmp_path: Path, fluidwarp: Run, monkeypatch: pytest.MonkeyPatch) -> Ca
 
 
 def declared(command: str) -> set[str]:
-    """The words of a command, by the names of its parameters."""
+    """The names of the parameters of a command."""
     callbacks = {each.name or each.callback.__name__: each.callback for each in cli.cli.registered_commands}  # pyright: ignore[reportOptionalMemberAccess]
     return set(signature(callbacks[command]).parameters)  # pyright: ignore[reportArgumentType]
 

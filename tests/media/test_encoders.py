@@ -153,6 +153,7 @@ def test_colours_go_where_they_can_be_told_and_a_refusal_names_what_tells_them(n
 
 
 def bits_of(ending: str, codec: str | None, bits: int) -> int:
+    """Bits a channel that a video has, made of a picture with `bits`."""
     options = ANIMATIONS[ending].encoding(codec)(Stream(False, bits))
     return depth_of(option(options, "-pix_fmt") or "")[0]
 

@@ -133,7 +133,7 @@ PILLOWS = {"JPEG 2000": "JPEG2000", "PGM": "PPM", "PBM": "PPM", "PNM": "PPM"}
 
 @pytest.mark.parametrize("kind", [kind for kind in TABLE if not kind.write], ids=lambda kind: kind.name)
 def test_a_picture_under_the_ending_of_another_kind_is_what_it_is(tmp_path: Path, kind: Format) -> None:
-    """Written by Pillow, each kind that has no signature in the table under each ending, as those of all others are."""
+    """Of each kind that is only read, written by Pillow under the ending of every kind."""
     mode = {"PGM": "L", "PBM": "1"}.get(kind.name, "RGB")
     y, x = np.mgrid[0:32, 0:32]
     colours = np.stack([x * 7, y * 7, (x + y) % 8 * 30], axis=-1).astype(np.uint8)
