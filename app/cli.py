@@ -24,6 +24,12 @@ if TYPE_CHECKING:
 
 # Whatever is slow to import is imported where it is used: a command line has to answer at once.
 
+UNPRINTED = {
+    errno.ENOSPC: "the disk is full; free some space",
+    errno.EBADF: "its output is open for reading only; check what it is redirected to",
+}
+"""Why what is printed cannot be written, and the mend."""
+
 
 def _is_sequence(name: str) -> bool:
     from app.media.numbered import is_sequence
@@ -102,9 +108,9 @@ def main() -> None:
             _fail(_usage(error), 2)
         if os.environ.get("FLUIDWARP_TRACEBACK"):
             raise
-        if isinstance(error, OSError) and error.errno == errno.ENOSPC:  # what files cannot be written is told as that
+        if isinstance(error, OSError) and error.errno in UNPRINTED:  # what files cannot be written is told as that
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            _fail("what this prints cannot be written: the disk is full; free some space", 1)
+            _fail(f"what this prints cannot be written: {UNPRINTED[error.errno]}", 1)
         words = str(error).strip().splitlines()
         said = f": {words[0]}" if words else ""
         _fail(f"this is a bug in fluidwarp ({type(error).__name__}{said}); FLUIDWARP_TRACEBACK=1 shows where", 70)

@@ -1320,10 +1320,15 @@ def test_what_is_printed_where_nobody_reads_or_nothing_fits_is_no_mistake_of_our
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
     reading, writing = os.pipe()
     os.close(reading)
-    with open(writing, "wb") as closed, open("/dev/full", "wb") as full:
+    with open(writing, "wb") as closed, open("/dev/full", "wb") as full, open(os.devnull, "rb") as unwritable:
         for output, said in (
             (closed, ""),
             (full, "fluidwarp: what this prints cannot be written: the disk is full; free some space\n"),
+            (
+                unwritable,
+                "fluidwarp: what this prints cannot be written: its output is open for reading only; "
+                "check what it is redirected to\n",
+            ),
         ):
             ran = subprocess.run(
                 [sys.executable, "-m", "app", "--version"],
