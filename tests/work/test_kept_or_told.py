@@ -821,6 +821,22 @@ def test_what_many_pictures_lose_alike_is_told_of_the_first(tmp_path: Path, flui
     )
 
 
+def test_what_is_said_of_many_pictures_in_the_same_words_is_told_once_whatever_their_names(
+    tmp_path: Path, fluidwarp: Run
+) -> None:
+    """A number in what is said is the whole name of one of the pictures."""
+    push = '[[stroke]]\ntool = "push"\nradius = 0.3\nsamples = [[0, 0.3, 0.5, 1.0]]\n'
+    (tmp_path / "fine.toml").write_text(f"version = 5\nduration = 0.1\n[fluid]\ngrid = 388\ndt = 0.1\n{push}")
+    names = ["p.png", "3.png", "8.png", "2.png"]
+    for name in names:
+        Image.fromarray(smooth()[:16, :16]).save(tmp_path / name)
+    ran = fluidwarp(tmp_path, "render", "fine.toml", *names, "-o", "out")
+    finer = "24.2 times as fine as the picture of 16 x 16 pixels"
+    said = f"a grid of 388 cells is {finer}, and takes long; one of 16 is as fine"
+    assert ran.returncode == 0
+    assert ran.stderr == f"fluidwarp: {tmp_path}/p.png: {said}\nfluidwarp: and of 3 more: {said}\n"
+
+
 # Where it ends ------------------------------------------------------------------------------------------------------
 
 
