@@ -162,9 +162,12 @@ def _fail(message: str, status: int) -> NoReturn:
 
 
 def _tell(*lines: str) -> None:
-    """Say what the user should hear of, a line each, on stderr."""
-    for line in filter(None, lines):
-        print(f"fluidwarp: {shown(line)}", file=sys.stderr)
+    """Say what the user should hear of, a line each, on stderr; what cannot be told there costs no work."""
+    try:
+        for line in filter(None, lines):
+            print(f"fluidwarp: {shown(line)}", file=sys.stderr, flush=True)
+    except OSError:  # a file on a full disk, or a reader who has gone; Python must not try again on its way out
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stderr.fileno())
 
 
 def flag(name: str, says: str) -> Any:

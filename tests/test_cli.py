@@ -1341,6 +1341,21 @@ def test_what_is_printed_where_nobody_reads_or_nothing_fits_is_no_mistake_of_our
             assert (ran.returncode, ran.stderr) == (1, said)
 
 
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no such device")
+def test_what_cannot_be_told_costs_no_picture_and_no_status(tmp_path: Path):
+    """Also what is told before a picture is begun, as that its grid is far too fine."""
+    push = '[[stroke]]\ntool = "push"\nradius = 0.3\nsamples = [[0, 0.3, 0.5, 1.0]]\n'
+    (tmp_path / "fine.toml").write_text(f"version = 5\nduration = 0.1\n[fluid]\ngrid = 388\ndt = 0.1\n{push}")
+    for name in ("a.png", "b.png"):
+        write_picture(tmp_path / name, Picture(np.zeros((12, 16, 3), np.uint8)))
+    with open("/dev/full", "wb") as full:
+        for words, status in ((["rendr"], 2), (["render", "fine.toml", "a.png", "b.png", "-o", "out"], 0)):
+            environment = os.environ | {"PYTHONPATH": str(ROOT)}
+            command = [sys.executable, "-m", "app", *words]
+            assert subprocess.run(command, cwd=tmp_path, env=environment, stderr=full).returncode == status
+    assert sorted(file.name for file in (tmp_path / "out").iterdir()) == ["a.png", "b.png"]
+
+
 @pytest.mark.parametrize(
     ("words", "status", "said"),
     [
