@@ -33,10 +33,10 @@ from app.model.picture import Picture
 
 
 class Still(FileClip):
-    """A clip of which only what is known of it is asked."""
+    """A clip without a frame, as only what is known of it is asked."""
 
     def pictures(self, *given: Any, **named: Any) -> Generator[tuple[int, Picture], None, None]:
-        raise NotImplementedError
+        yield from ()
 
 
 def option(options: list[str], name: str) -> str | None:
