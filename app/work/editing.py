@@ -52,6 +52,8 @@ class Editing(Painting):
         """Set something from the playhead on: viscosity, drag, walls, clear_velocity, reset_warp, clear_masks."""
         self.preview_change(**settings)
         self.commit(name)
+        if self._last is None:  # an edit of nothing lets nothing go on
+            return
         if self.tick == self.end - 1:
             self._arrive()
         if self.end and (self.is_behind or self._is_fast()):
@@ -63,6 +65,10 @@ class Editing(Painting):
         base, lasts = self._base, settings.keys() <= {"viscosity", "drag", "walls"}
         if not (base.stroke or base.change or (base.mask and self.end)) and self.target == 0 and lasts:
             self._use_edited(base.edited(fluid=base.fluid.model_copy(update=settings)))
+            return
+        fluid = base.fluid_at(self._next)
+        if lasts and fluid.model_copy(update=settings) == fluid:  # what is set to what it is already is no edit
+            self._use_edited(base)
             return
         tick = self._go_on()
         self.playing = self.coasting = False

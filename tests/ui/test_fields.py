@@ -894,6 +894,30 @@ def test_a_double_click_on_a_setting_changes_it_where_the_playhead_was(robot: Ro
     assert twice.change[0].drag == DEFAULT.drag != once.change[0].drag
 
 
+@pytest.mark.parametrize("at", [6, 12, 30])
+@pytest.mark.parametrize("label", ["Viscosity", "Drag"])
+def test_a_double_click_on_a_setting_that_has_its_default_is_no_edit(
+    robot: Robot, widgets: Widgets, label: str, at: int
+) -> None:
+    """It was one wherever the recipe's last change is at an earlier tick."""
+    session = robot.editor.session
+    session.begin_with(viscosity=0.1, drag=0.5)
+    stroke = Stroke(tool="push", samples=((0, 0.3, 0.5, 1.0), (20, 0.4, 0.4, 1.0)))
+    change = Change(tick=6, viscosity=DEFAULT.viscosity, drag=DEFAULT.drag)
+    session.edit("Push", stroke=(stroke,), change=(change,), duration=1.0)
+    session.seek(at)
+    session.settle()
+    before = session.recipe, session.document.history.entries
+    only(robot, "fluid")
+    widgets.look()
+    for _ in range(2):
+        robot.click(*widgets.at[label].middle)
+    robot.frame(count=2)
+    session.settle()
+    assert (session.recipe, session.document.history.entries) == before
+    assert session.target == at
+
+
 @pytest.mark.parametrize("key", ["home", "end", "space", "tab", "escape", "delete", "backspace", "t", "[", "4"])
 def test_keys_of_an_open_list_are_its_own(robot: Robot, widgets: Widgets, key: str) -> None:
     only(robot)

@@ -356,6 +356,34 @@ def test_a_slider_that_is_dragged_is_one_edit(session: Session) -> None:
     assert len(session.recipe.change) == 1
 
 
+def test_what_is_set_to_what_it_is_already_is_no_edit(session: Session) -> None:
+    """It was one where the last change is at an earlier tick, and took away what came after a playhead sent back."""
+    paint(session, "push", (0.3, 0.5), (0.5, 0.5))
+    session.settle()
+    session.change("Drag", drag=1.0)
+    changed = session.end
+    for start in (0.3, 0.5):
+        paint(session, "push", (start, 0.4), (start + 0.1, 0.4))
+        session.settle()
+    recipe, entries = session.recipe, session.document.history.entries
+    for tick in (changed, changed + 2, session.end):
+        session.seek(tick)
+        session.settle()
+        for settings in ({"drag": 1.0}, {"viscosity": recipe.fluid.viscosity, "walls": recipe.fluid.walls}):
+            session.change("Change", **settings)
+            assert (session.recipe, session.document.history.entries) == (recipe, entries)
+            assert (session.target, session.is_moving) == (tick, False)
+    for drag in (3.0, 1.0):
+        session.preview_change(drag=drag)
+    session.commit("Drag")
+    assert (session.recipe, session.document.history.entries) == (recipe, entries)
+    session.seek(changed)
+    session.settle()
+    session.play()
+    session.change("Drag", drag=1.0)
+    assert (session.playing, session.coasting, session.recipe) == (True, False, recipe)
+
+
 def test_settings_before_the_first_stroke_are_the_recipe_s_own(session: Session) -> None:
     session.change("Water", viscosity=0.0006, drag=0.5)
     assert session.recipe.change == ()
@@ -685,7 +713,7 @@ def test_going_on_from_within_a_stroke_with_few_samples_changes_nothing_that_was
     session.seek(12)
     session.settle()
     seen = session.replay.warp.read()
-    session.change("Honey", viscosity=0.03)
+    session.change("Putty", viscosity=0.3)
     session.seek(12)
     session.settle()
     np.testing.assert_allclose(session.replay.warp.read(), seen, atol=1e-5)
