@@ -37,8 +37,8 @@ class History:
         self.budget = budget
         self._entries = [Entry("Open", recipe, _own_bytes(recipe, None))]
         self._index = self._made = 0
-        # The entries and the index before the last commit, for `retract`; None once that can no longer be taken back.
-        self._before: tuple[list[Entry], int] | None = None
+        # The present before the last commit and what could be redone then, for `retract`; none once that cannot be.
+        self._before: list[Entry] = []
 
     @classmethod
     def restored(cls, entries: Sequence[Entry], index: int) -> History:
@@ -84,18 +84,20 @@ class History:
 
     @property
     def nbytes(self) -> int:
-        """Bytes that the entries hold, roughly."""
-        return sum(entry.nbytes for entry in self._entries)
+        """Bytes that the entries hold, roughly, with those that only `retract` has a use for."""
+        return sum(entry.nbytes for entry in (*self._entries, *self._before[1:]))
 
     def commit(self, name: str, recipe: Recipe) -> None:
         """Make `recipe` the present, as the edit `name`; what could be redone is gone. An edit of nothing is none."""
         if recipe is self.recipe or recipe == self.recipe:
             return
         self._made += 1
-        self._before = [*self._entries], self._index
+        self._before = self._entries[self._index :]
         del self._entries[self._index + 1 :]
         self._entries.append(Entry(name, recipe, _own_bytes(recipe, self.recipe), self._made))
         self._index += 1
+        while self.nbytes > self.budget and self._before[1:]:
+            del self._before[-1]
         while self.nbytes > self.budget and self._index > 0:
             del self._entries[0]
             self._index -= 1
@@ -106,7 +108,7 @@ class History:
             return
         del self._entries[self._index + 1 :]
         self.go_on(recipe)
-        self._before = None
+        self._before = []
 
     def go_on(self, recipe: Recipe) -> None:
         """Let the present be `recipe`, as no edit: the recording goes on. What can be redone stays."""
@@ -120,19 +122,17 @@ class History:
         def changed(entries: list[Entry]) -> list[Entry]:
             return [replace(entry, recipe=change(entry.recipe)) for entry in entries]
 
-        self._entries = changed(self._entries)
-        if self._before is not None:
-            self._before = changed(self._before[0]), self._before[1]
+        self._entries, self._before = changed(self._entries), changed(self._before)
 
     def undo(self) -> Recipe:
         """The recipe one edit earlier; the present one where there is none."""
-        self._before = None
+        self._before = []
         self._index = max(self._index - 1, 0)
         return self.recipe
 
     def redo(self) -> Recipe:
         """The recipe one edit later; the present one where there is none."""
-        self._before = None
+        self._before = []
         self._index = min(self._index + 1, len(self._entries) - 1)
         return self.recipe
 
@@ -144,17 +144,19 @@ class History:
         """
         if not 0 <= index < len(self._entries):
             raise IndexError(f"the history has {len(self._entries)} entries, not one number {index}")
-        self._before = None
+        self._before = []
         self._index = index
         return self.recipe
 
     def retract(self) -> Recipe:
         """Take the last commit back as if it had never been, if nothing else has been done since; the present recipe.
 
-        It cannot be redone, and what could be redone before it can be again.
+        It cannot be redone, and what could be redone before it can be again, but for the last of it where `budget` is
+        too small for both.
         """
-        if self._before is not None:
-            (self._entries, self._index), self._before = self._before, None
+        if self._before:
+            self._index = max(self._index - 1, 0)  # 0 where the commit had let even the one before it go
+            self._entries[self._index :], self._before = self._before, []
         return self.recipe
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from weakref import ref
 
 import pytest
 
@@ -116,15 +117,14 @@ def test_random_actions_against_a_plain_list():
 
 
 def test_what_is_retracted_has_never_been_and_so_has_ended_nothing():
-    """Also on another grid by then, and where it had let the oldest go; after anything else, nothing is taken back."""
+    """Also on another grid by then; after anything else, nothing is taken back."""
     history = History(Recipe())
-    history.budget = history.nbytes * 3
     for name in ("A", "B"):
         history.commit(name, Recipe(name=name))
     history.undo()
     before = history.entries
     history.commit("Long", Recipe(name="C", stroke=(stroke(1, 100),)))
-    assert [entry.name for entry in history.entries] == ["Long"]
+    assert [entry.name for entry in history.entries] == ["Open", "A", "Long"]
     history.replace_all(lambda recipe: recipe.on_grid(64))
     assert history.retract().name == "A"
     assert [(entry.name, entry.number) for entry in history.entries] == [(one.name, one.number) for one in before]
@@ -136,6 +136,27 @@ def test_what_is_retracted_has_never_been_and_so_has_ended_nothing():
         entries, index = history.entries, history.index
         history.retract()
         assert (history.entries, history.index) == (entries, index)
+
+
+def test_what_only_a_retraction_has_a_use_for_is_within_the_budget():
+    """What an edit had pushed out was all held beside it until something else was done."""
+    history = History(Recipe())
+    for seed in range(8):
+        history.commit(f"Push {seed}", Recipe(stroke=(stroke(seed, 100),)))
+    history.budget = history.nbytes
+    while history.can_undo:
+        history.undo()
+    held = [ref(entry.recipe) for entry in history.entries[1:]]
+    history.commit("Long", Recipe(stroke=(stroke(9, 400),)))
+    assert history.nbytes <= history.budget
+    assert [one() is not None for one in held] == [True] * 4 + [False] * 4, "it takes the room of four"
+    assert history.retract().stroke == ()
+    assert [entry.name for entry in history.entries] == ["Open", *(f"Push {seed}" for seed in range(4))]
+    history.go_to(4)
+    history.commit("Longer", Recipe(stroke=(stroke(10, 1000),)))
+    assert [entry.name for entry in history.entries] == ["Longer"]
+    assert [one() is not None for one in held] == [False] * 3 + [True] + [False] * 4
+    assert (history.retract().stroke, history.undo_name) == ((stroke(3, 100),), None)
 
 
 def test_no_such_entry():

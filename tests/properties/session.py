@@ -446,9 +446,15 @@ class Work(RuleBasedStateMachine):
             index, entries = self.index, self.entries
             self.work.edit("Amount", amount=value)
             self._did("Amount")
+            edit = self.entries[-1]
             self._note()
             self.work.retract()
-            self._is(index, entries)
+            now = self.work.document.history
+            # What there was no room for beside the edit is gone: the oldest, and the last of what could be redone.
+            gone = [entry.number for entry in entries].index(now.entries[0].number)
+            kept = entries[gone : gone + len(now.entries)]
+            assert kept == entries or sum(entry.nbytes for entry in (*entries, edit)) > now.budget
+            self._is(index - gone, kept)
             self._look()
 
     @rule()
