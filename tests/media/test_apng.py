@@ -529,12 +529,18 @@ def test_an_apng_has_as_many_frames_as_it_says(tmp_path: Path, frames: int, told
 
 
 def test_a_png_of_which_the_frames_are_none_is_opened_as_a_still(tmp_path: Path):
+    """Also where it tells of them behind its picture, and not before it as PNG has it (third edition, 5.6)."""
     still, *others = [Image.new("RGB", (WIDTH, HEIGHT), (40 * number, 90, 0)) for number in range(3)]
     still.save(path := tmp_path / "a.png", save_all=True, append_images=others)
     data = path.read_bytes()
     at = data.index(b"acTL") - 4
-    for more in (b"", chunk(b"acTL", struct.pack(">II", 0, 0))):
-        path.write_bytes(data[:at] + more + data[at + 20 :])
+    length = int.from_bytes(data[(picture := data.index(b"IDAT") - 4) : picture + 4], "big")
+    told, head, before, after = (
+        data[at : at + 20], data[:at], data[at + 20 : picture + 12 + length], data[picture + 12 + length :]
+    )  # fmt: skip
+    none = chunk(b"acTL", struct.pack(">II", 0, 0))
+    for changed in (head + before + after, head + none + before + after, head + before + told + after):
+        path.write_bytes(changed)
         source = open_source(path)
         assert (source.clip, source.picture.note, source.picture.pixels[0, 0].tolist()) == (None, "", [0, 90, 0])
 

@@ -34,6 +34,8 @@ def read(data: bytes) -> Animation | None:
                     if len(frames) == MOST_FRAMES:
                         raise TooManyFrames
                 control, pieces = body, []
+            case b"IDAT" if not told[0]:  # frames are told of before the picture (5.6), or it is a still
+                return None
             case b"IDAT" if control is not None:
                 pieces.append(body)
             case b"fdAT":
