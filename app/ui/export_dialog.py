@@ -555,7 +555,7 @@ class Exports:
             self.messages.warn(error) if error else self.messages.done("The picture is on the clipboard.")
         if process is None:
             return
-        process.poll()
+        process.poll(lambda said: self.messages.say(heading(said)))
         if process.is_done:
             self._process = None
             self.went_well = not process.error

@@ -33,7 +33,6 @@ class WorkProcess:
         self.error = ""
         self.outcome = Outcome("")
         self._died = died
-        self._warnings = list[str]()
         self._inbox: queue.SimpleQueue[tuple[Worker, Reply]] = queue.SimpleQueue()
         self._worker = Worker(self._inbox)
         # A picture is more than a pipe holds: the window would wait until the other is awake.
@@ -44,8 +43,8 @@ class WorkProcess:
         """What the person should hear of it, once it has ended well."""
         return self.outcome.notices
 
-    def poll(self) -> None:
-        """Hear how far it is."""
+    def poll(self, warn: Callable[[str], object] = lambda said: None) -> None:
+        """Hear how far it is; `warn` is told what the person may want to stop it for, and no notice says it again."""
         if self.is_done:
             return
         while not self.is_done and not self._inbox.empty():
@@ -53,9 +52,9 @@ class WorkProcess:
                 case Status(done, state):
                     self.part, self.state = done, state
                 case Warned(said):
-                    self._warnings.append(said)
+                    warn(said)
                 case Outcome() as outcome:
-                    self.is_done, self.error, self.outcome = True, outcome.in_window, outcome.after(self._warnings)
+                    self.is_done, self.error, self.outcome = True, outcome.in_window, outcome
                 case None:
                     self.is_done, self.error = True, self._died
         if self.is_done:

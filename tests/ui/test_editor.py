@@ -27,7 +27,7 @@ from app.media.project import Project
 from app.model.forces import VortexForce
 from app.model.mask_edits import MaskStroke
 from app.model.picture import Picture
-from app.model.recipe import Recipe, Stop
+from app.model.recipe import FluidSettings, Recipe, Stop
 from app.model.tools import TOOLS
 from app.progress import Progress
 from app.ui import workspace
@@ -1836,6 +1836,19 @@ def test_where_a_recipe_s_stop_ends_an_export_is_told(robot: Robot, tmp_path: Pa
         r"Stopped at t = .* s \(tick \d+\): largest displacement .*\. The recipe's \[stop\] ended it there\.", stopped
     )
     assert exported.startswith("Exported ")
+
+
+def test_a_grid_far_finer_than_a_picture_is_told_while_that_is_exported(robot: Robot, tmp_path: Path) -> None:
+    """It was told with the result, when there was nothing left to stop."""
+    push = VortexForce(kind="vortex", point=(0.5, 0.5), radius=0.2, strength=1.0)
+    recipe = Recipe(force=(push,), duration=60.0, fluid=FluidSettings(grid=388))
+    small = Picture(np.zeros((48, 64, 3), np.uint8))
+    robot.editor.exports.start(Job(recipe, small, tmp_path, Outputs(tmp_path / "small.png")))
+    robot.until(lambda: robot.editor.messages.shown)
+    assert robot.editor.exports.is_running
+    (told,) = robot.editor.messages.shown
+    assert told.text.startswith("A grid of 388 cells is 6.06 times as fine as the picture of 64 x 48 pixels")
+    robot.editor.exports.cancel()
 
 
 def test_what_an_export_tells_is_shown(robot: Robot, tmp_path: Path) -> None:

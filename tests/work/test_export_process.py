@@ -55,10 +55,10 @@ class Slow(Job):
         return Slow, (Called(time.sleep, PATIENCE), self.rest)
 
 
-def ended(process: ExportProcess) -> ExportProcess:
+def ended(process: ExportProcess, warn: Callable[[str], object] = lambda said: None) -> ExportProcess:
     deadline = time.monotonic() + PATIENCE
     while not process.is_done and time.monotonic() < deadline:
-        process.poll()
+        process.poll(warn)
         time.sleep(0.01)
     assert process.is_done, "still at work"
     return process
@@ -78,12 +78,18 @@ def test_a_picture_larger_than_a_pipe_is_exported(tmp_path: Path):
     assert (read_picture(tmp_path / "out.png").pixels == read_picture(PICTURE).pixels).all()
 
 
-def test_what_is_told_before_the_work_is_among_its_notices(tmp_path: Path):
+def test_what_is_told_before_the_work_is_heard_before_it_is_done_and_not_again(tmp_path: Path):
     force = "[[force]]\nkind = 'vortex'\npoint = [0.5, 0.5]\nradius = 0.3\nstrength = 5\n"
     recipe = Recipe.parse(f"duration = 0.02\n[fluid]\ngrid = 388\n{force}")
     small = Picture(np.zeros((48, 64, 3), np.uint8))
-    process = ended(ExportProcess(Job(recipe, small, tmp_path, Outputs(tmp_path / "out.png"))))
-    (said,) = process.notices
+    process, heard = ExportProcess(Job(recipe, small, tmp_path, Outputs(tmp_path / "out.png"))), list[str]()
+
+    def warn(said: str) -> None:
+        assert not process.is_done
+        heard.append(said)
+
+    assert ended(process, warn).notices == ()
+    (said,) = heard
     assert said.startswith("a grid of 388 cells is 6.06 times as fine as the picture")
 
 
