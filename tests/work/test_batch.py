@@ -370,7 +370,7 @@ def workers(of: int) -> list[int]:
 def wait_until(true: Callable[[], object]) -> None:
     asked = time.monotonic()
     while not true():
-        assert time.monotonic() < asked + 60
+        assert time.monotonic() < asked + 180  # for a busy machine
         time.sleep(0.02)
 
 
@@ -417,12 +417,17 @@ def test_what_a_terminal_tells_all_of_its_processes_the_ones_that_work_do_not_he
     """The one that waits for them hears it, and says what becomes of them."""
     inbox, before = queue.SimpleQueue[Any](), {*workers(os.getpid())}
     one = worker.Worker(inbox)
-    (pid,) = {*workers(os.getpid())} - before
-    os.kill(pid, number)
-    one.begin(order(folder / "a.toml", folder / "p0.png", Outputs(folder / "out.png")))
-    while isinstance(said := inbox.get(timeout=60)[1], Status):
+    try:
+        (pid,) = {*workers(os.getpid())} - before
         os.kill(pid, number)
-    one.end()
+        one.begin(order(folder / "a.toml", folder / "p0.png", Outputs(folder / "out.png")))
+        said: Any = Status(0.0, "")
+        while isinstance(said, Status):
+            wait_until(lambda: not inbox.empty())
+            said = inbox.get()[1]
+            os.kill(pid, number)
+    finally:
+        one.end()
     assert said is not None
     assert said.error == ""
     assert (folder / "out.png").exists()
