@@ -418,9 +418,10 @@ class Editor:
 
     def _draw_over_canvas(self) -> None:
         """What tells of work under way, messages and dialogs."""
-        if self.session.notice:
-            self.messages.say(self.session.notice)
-            self.session.notice = None
+        if (session := self.session).notice:
+            before = session.retracted
+            self.messages.say(session.notice, lambda: session.retracted == before)
+            session.notice = None
         self.cautions.look()
         self.exports.draw(self.ui, self.layout.canvas)
         self.fits.draw(self.ui, self.layout.canvas)

@@ -46,9 +46,9 @@ class Messages:
         self.shown: list[Message] = []
         self._changed = changed
 
-    def say(self, text: str) -> None:
+    def say(self, text: str, holds: Callable[[], bool] = lambda: True) -> None:
         """Something to know."""
-        self._add(Message(text))
+        self._add(Message(text, holds=holds))
 
     def warn(self, text: str, holds: Callable[[], bool] = lambda: True) -> None:
         """Something that went wrong; it stays until it is closed, or does not hold any more."""

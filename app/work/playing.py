@@ -155,6 +155,8 @@ class Playing(Editing):
             tick = self.moment if last.changed_at is None else last.changed_at
             plays, coasts = self.playing, self.coasting and last.coasts_on
             self.release()
+            self.notice = None
+            self.retracted += 1
             self._show(self.document.history.retract())
             self.seek(min(tick, self.end) if coasts else tick)
             self.playing = plays

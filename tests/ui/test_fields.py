@@ -899,7 +899,10 @@ def test_a_double_click_on_a_setting_changes_it_where_the_playhead_was(robot: Ro
 def test_a_double_click_on_a_setting_that_has_its_default_is_no_edit(
     robot: Robot, widgets: Widgets, label: str, at: int
 ) -> None:
-    """It was one wherever the recipe's last change is at an earlier tick."""
+    """It was one wherever the recipe's last change is at an earlier tick.
+
+    Nor does it stay told that what came after the playhead was left to Undo, as the first click had it.
+    """
     session = robot.editor.session
     session.begin_with(viscosity=0.1, drag=0.5)
     stroke = Stroke(tool="push", samples=((0, 0.3, 0.5, 1.0), (20, 0.4, 0.4, 1.0)))
@@ -916,6 +919,7 @@ def test_a_double_click_on_a_setting_that_has_its_default_is_no_edit(
     session.settle()
     assert (session.recipe, session.document.history.entries) == before
     assert session.target == at
+    assert robot.editor.messages.shown == []
 
 
 @pytest.mark.parametrize("key", ["home", "end", "space", "tab", "escape", "delete", "backspace", "t", "[", "4"])
