@@ -276,7 +276,7 @@ class Still:
         self.job = job
         Still.last = self
 
-    def poll(self) -> None: ...
+    def poll(self, *heard: object) -> None: ...
     def stop(self, then: Callable[[], None]) -> None:
         then()
 

@@ -86,7 +86,7 @@ class Still:
     def __init__(self, work: Any) -> None:
         self.job = self.fit = work
 
-    def poll(self) -> None: ...
+    def poll(self, *heard: object) -> None: ...
     def stop(self, then: object = None) -> None:
         type(self).stopped += 1
 
