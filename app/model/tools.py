@@ -144,6 +144,7 @@ class Tool:
         key: chooses it; with Shift, its opposite.
         gesture: from a press to its strokes; None for tools that move the view and not the picture.
         directions: what its two directions are called.
+        back: the hint of the second one, where that of the first is wrong for it.
         masks: it paints a mask, which then is shown.
         settings: what of the brush is set for it.
     """
@@ -154,6 +155,7 @@ class Tool:
     hint: str
     gesture: Callable[[Press, Touch], Gesture] | None = None
     directions: tuple[str, str] | None = None
+    back: str = ""
     masks: bool = False
     settings: tuple[str, ...] = ("radius", "hardness", "strength")
 
@@ -348,11 +350,13 @@ def _held(press: Press, tick: int, **what: Any) -> RecipeHandle:
 
 
 TOOLS = (
-    Tool("push", "Push", "p", "Drag to push the picture along", painting("push"), ("Along", "Against"),
+    Tool("push", "Push", "p", "Drag on the picture to push it", painting("push"), ("Along", "Against"),
          settings=("radius", "hardness", "strength", "hold", "local")),
-    Tool("curve", "Curve", "c", "Draw a path: the picture flows along it", _curve, ("Forwards", "Backwards")),
+    Tool("curve", "Curve", "c", "Draw a path: the picture flows along it", _curve, ("Forwards", "Backwards"),
+         back="Draw a path: the picture flows back along it"),
     Tool("twirl", "Twirl", "t", "Hold to turn the picture", painting("twirl"), ("Clockwise", "Anticlockwise")),
-    Tool("bloat", "Bloat", "b", "Hold to let the picture swell", painting("bloat", "pinch"), ("Bloat", "Pinch")),
+    Tool("bloat", "Bloat", "b", "Hold to let the picture swell", painting("bloat", "pinch"), ("Bloat", "Pinch"),
+         back="Hold to let the picture shrink"),
     Tool(
         "handle", "Handle", "g",
         "Drag a point to where it should go; click to pin it; with Shift draw a line to hold",
@@ -365,7 +369,7 @@ TOOLS = (
     ),
     Tool(
         "freeze", "Freeze", "f", "Paint what must stay as it is", painting("freeze", "thaw"), ("Freeze", "Thaw"),
-        masks=True,
+        back="Paint what may move again", masks=True,
     ),
     Tool("smooth", "Smooth mask", "s", "Soften the edges of what you have painted", painting("smooth"), masks=True),
     Tool("select", "Select", "m", "Select an area, then fill it into a mask"),

@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -382,7 +383,7 @@ def test_the_first_hint_is_one_row(robot: Robot, monkeypatch: pytest.MonkeyPatch
 
 
 def test_a_hint_is_of_the_tool_in_hand(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
-    """ "Drag on the picture to push it." stood there with each: with handles, and where only the view is moved."""
+    """And of its direction: with Pinch the picture was said to swell."""
     said, text = list[str](), Ui.text
     monkeypatch.setattr(
         Ui, "text", lambda ui, words, *given, **named: (said.append(words.strip()), text(ui, words, *given, **named))
@@ -394,15 +395,15 @@ def test_a_hint_is_of_the_tool_in_hand(robot: Robot, monkeypatch: pytest.MonkeyP
     )
     robot.rest()
     shows_legend = {"thicken", "smooth"}  # in the place of a hint
-    hints = {"push": "Drag on the picture to push it.", "select": SELECT_BY["rectangle"]}
-    for tool in TOOLS:
-        robot.editor.state.choose_tool(tool.name, False)
+    selecting = SELECT_BY["rectangle"]
+    known = {selecting, *(f"{hint}." for tool in TOOLS for hint in (tool.hint, tool.back) if hint)}
+    for tool, is_opposite in product(TOOLS, (False, True)):
+        robot.editor.state.choose_tool(tool.name, is_opposite)
         robot.frame(count=2)
         said.clear()
         robot.frame()
-        own = hints.get(tool.name, f"{tool.hint}.")
-        is_there = tool.name in hints or (tool.gesture is not None and tool.name not in shows_legend)
-        known = {*hints.values(), *(f"{each.hint}." for each in TOOLS)}
+        own = selecting if tool.name == "select" else f"{(is_opposite and tool.back) or tool.hint}."
+        is_there = tool.name == "select" or (tool.gesture is not None and tool.name not in shows_legend)
         assert known & {*said} == ({own} if is_there else set()), tool.name
     robot.editor.state.choose_tool("handle", False)
     robot.size = (560, 500)

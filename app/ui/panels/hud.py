@@ -6,7 +6,6 @@ from imgui_bundle import imgui
 from imgui_bundle.imgui import ImVec2
 
 from app.model.recipe import Recipe
-from app.model.tools import Tool
 from app.ui.actions import Do
 from app.ui.clock import Clock
 from app.ui.editor_state import EditorState
@@ -53,7 +52,7 @@ def draw(
     if how and not is_covered and has_room:
         _how(ui, canvas, how)
     elif preferences.hint and state.tool.gesture and not how and has_room and not has_legend and not state.statistics:
-        _hint(ui, canvas, state.tool, preferences)
+        _hint(ui, canvas, (state.is_opposite and state.tool.back) or state.tool.hint, preferences)
     if has_legend:
         _legend(ui, canvas, state.overlays["viscosity"].opacity)
     if state.statistics:
@@ -118,9 +117,9 @@ def _how(ui: Ui, canvas: Rect, words: str) -> None:
         imgui.pop_text_wrap_pos()
 
 
-def _hint(ui: Ui, canvas: Rect, tool: Tool, preferences: Preferences) -> None:
+def _hint(ui: Ui, canvas: Rect, hint: str, preferences: Preferences) -> None:
     """What the tool in hand does, if there is room for it; until something has been painted."""
-    words = "Drag on the picture to push it." if tool.name == "push" else f"{tool.hint}."
+    words = f"{hint}."
     imgui.push_font(ui.fonts.bold, 14.0)
     width = imgui.calc_text_size(words).x + ui.px(BESIDE)
     imgui.pop_font()
