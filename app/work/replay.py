@@ -41,6 +41,7 @@ from solver.warp.accumulated import map_size
 from solver.warp.density import Density
 from solver.warp.map import WarpMap
 from solver.warp.scaled import ScaledMap
+from solver.warp.submap import differences_of
 
 CHECKPOINT_EVERY = 16  # ticks
 
@@ -438,12 +439,15 @@ class Replay:
         """Everything as it is at tick 0."""
         recipe, source = self.recipe, self.pictures.source
         self.grid = Grid.for_picture(source.width, source.height, recipe.fluid.grid)
+        largest = self.device.limits.max_texture_size
+        if max(differences_of(self.grid.size)) > largest:
+            cells = f"a grid of {self.grid.nx} x {self.grid.ny} cells is more than this graphics device can hold"
+            raise UserError(f"{cells}; use a smaller --grid or 'fluid.grid'", in_window=f"{cells}; choose fewer")
         fluid, warp = SOLVERS[recipe.fluid.solver]
         self.window: FlowWindow | None = None
         self._has_windows = may_have_windows(recipe)
         self.fluid = self._on_whole = fluid(self.device, self.grid)
         self._in_window: Fluid | None = None
-        largest = self.device.limits.max_texture_size
         fine = map_size(self.grid, (source.width, source.height), largest)
         self.warp = warp(self.device, self.grid, fine)
         self._scaled = ScaledMap(self.warp)

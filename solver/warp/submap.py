@@ -29,13 +29,14 @@ class Differences:
 
     def of(self, device: Device, displacement: Field, images: Images) -> Field:
         """Of a displacement that is the same as last time, unless `forget` was called."""
-        width, height = displacement.size[0] + 2, displacement.size[1] + 2
+        width, height = size = differences_of(displacement.size)
         if self._drawn is None:
-            self._drawn = Field(device, (width, 2 * height), 4, "differences", cleared=False)
+            self._drawn = Field(device, size, 4, "differences", cleared=False)
         if self._images != images:
-            for half in (0, 1):
-                draw = device.pass_("warp/difference.frag", **({"BENDS": 1} if half else {}))
-                draw(self._drawn, region=(0, half * height, width, height), displacement=displacement, images=images)
+            half = height // 2
+            for y in (0, half):
+                draw = device.pass_("warp/difference.frag", **({"BENDS": 1} if y else {}))
+                draw(self._drawn, region=(0, y, width, half), displacement=displacement, images=images)
             self._images = images
         return self._drawn
 
@@ -137,6 +138,11 @@ class Level:
         """Free the textures."""
         for thing in (self.field, self.differences):
             thing.release()
+
+
+def differences_of(size: tuple[int, int]) -> tuple[int, int]:
+    """The size of `Differences` of a displacement of a size: two halves, each within a border of a cell."""
+    return size[0] + 2, 2 * (size[1] + 2)
 
 
 def window_of(grid: Grid) -> tuple[float, float, float, float]:

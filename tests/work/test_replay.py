@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -68,6 +69,19 @@ def replay(device: Device) -> Iterator[Replay]:
     replay = Replay(device, RECIPE, pictures())
     yield replay
     replay.release()
+
+
+def test_a_grid_that_the_graphics_device_cannot_hold_is_refused_in_a_sentence(
+    device: Device, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It was told as a bug: the texture that moves are read from is twice as high as the grid, with a border."""
+    monkeypatch.setattr(device, "limits", replace(device.limits, max_texture_size=1024))
+    square = Pictures(Picture(np.zeros((60, 60, 3), np.uint8)))
+    most = Replay(device, RECIPE.on_grid(510), square)
+    most.advance()
+    most.release()
+    with pytest.raises(UserError, match=r"^a grid of 511 x 511 cells is more than this .*; use a smaller --grid or"):
+        Replay(device, RECIPE.on_grid(511), square)
 
 
 def test_a_fault_of_a_field_is_not_told_as_that_of_what_acts(replay: Replay) -> None:
