@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 import typer
 from typer.core import TyperGroup
 
-from app.errors import Cancelled, UserError, shown
+from app.errors import BUG, Cancelled, UserError, shown
 from app.progress import INTERRUPTED, deaf_children
 
 if TYPE_CHECKING:
@@ -113,7 +113,7 @@ def main() -> None:
             _fail(f"what this prints cannot be written: {UNPRINTED[error.errno]}", 1)
         words = str(error).strip().splitlines()
         said = f": {words[0]}" if words else ""
-        _fail(f"this is a bug in fluidwarp ({type(error).__name__}{said}); FLUIDWARP_TRACEBACK=1 shows where", 70)
+        _fail(f"this is a bug in fluidwarp ({type(error).__name__}{said}); FLUIDWARP_TRACEBACK=1 shows where", BUG)
 
 
 def _has_folder() -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+BUG = 70  # the status that a mistake of ours ends a command with
 MOST_SHOWN = 1000  # characters of a message
 
 # What is obeyed instead of shown: control characters, line separators, and the halves of characters that stand for

@@ -28,7 +28,7 @@ import typer.main
 
 import solver.gl.passes
 from app import cli
-from app.errors import UserError
+from app.errors import BUG, UserError
 from app.work.recovery import LOCK
 from solver.gl.device import Device
 from support.commands import Run
@@ -37,9 +37,6 @@ from support.khronos import Programs
 
 COMMAND = cache(typer.main.get_command)
 """Typer reads all annotations anew for each command line, which is most of what a wrong one costs."""
-
-BUG = 70
-"""The status of a mistake of ours, which no command line of a test ends with."""
 
 AS_PYTHON = re.compile(
     r"""[(\[{](['"])[^'"]*\1, ?['"]|\((['"])[^'"]*\2,\)|<[\w.]+ (object|at) |[a-z]\w+_keys\(|Path\("""

@@ -20,7 +20,7 @@ import pytest
 from PIL import Image
 
 from app import cli, doctor, progress
-from app.errors import Cancelled, UserError
+from app.errors import BUG, Cancelled, UserError
 from app.gallery import figures, retouching
 from app.media.displacement import Displacement, PixelPlaces
 from app.media.maps import Kind, read_map, write_map
@@ -1259,7 +1259,7 @@ class ContextError(Exception):
     """Known by its name, as that of the solver is, which is not loaded for it."""
 
 
-BUG = "FLUIDWARP_TRACEBACK=1 shows where"
+WHERE = "FLUIDWARP_TRACEBACK=1 shows where"
 ENDS: list[tuple[BaseException, int, str]] = [
     (UserError("a.png is gone"), 1, "a.png is gone"),
     (UserError("a.mp4 has changed", 65, "in the window's words"), 65, "a.mp4 has changed"),
@@ -1267,10 +1267,10 @@ ENDS: list[tuple[BaseException, int, str]] = [
     (KeyboardInterrupt(), 130, "interrupted"),
     (MemoryError(), 1, "there is not enough memory; try a smaller --size or --grid"),
     (ContextError("no OpenGL"), 1, "no OpenGL; `fluidwarp doctor` tells more"),
-    (RuntimeError(), 70, f"this is a bug in fluidwarp (RuntimeError); {BUG}"),
-    (KeyError("a"), 70, f"this is a bug in fluidwarp (KeyError: 'a'); {BUG}"),
-    (ValueError(" first\nsecond"), 70, f"this is a bug in fluidwarp (ValueError: first); {BUG}"),
-    (OSError(errno.EIO, "no disk"), 70, f"this is a bug in fluidwarp (OSError: [Errno {errno.EIO}] no disk); {BUG}"),
+    (RuntimeError(), BUG, f"this is a bug in fluidwarp (RuntimeError); {WHERE}"),
+    (KeyError("a"), BUG, f"this is a bug in fluidwarp (KeyError: 'a'); {WHERE}"),
+    (ValueError(" first\nsecond"), BUG, f"this is a bug in fluidwarp (ValueError: first); {WHERE}"),
+    (OSError(errno.EIO, "no disk"), BUG, f"this is a bug in fluidwarp (OSError: [Errno {errno.EIO}] no disk); {WHERE}"),
 ]  # fmt: skip
 
 
@@ -1286,7 +1286,7 @@ def test_whatever_goes_wrong_ends_in_one_sentence_and_a_status(
     with pytest.raises(SystemExit) as ended:
         cli.main()
     assert (ended.value.code, *capfd.readouterr()) == (status, "", f"fluidwarp: {said}\n")
-    if status == 70:
+    if status == BUG:
         monkeypatch.setenv("FLUIDWARP_TRACEBACK", "1")
         with pytest.raises(type(error)) as raised:
             cli.main()

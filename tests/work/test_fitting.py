@@ -658,7 +658,7 @@ def test_what_cannot_be_fitted_ends_in_a_sentence(fluidwarp: Run, tmp_path: Path
     (tmp_path / "p.csv").write_text("10,10,12,12\n")
     (tmp_path / "bad.csv").write_text("10,10,12,12\n10,10,12\n")
     done = fluidwarp(tmp_path, "fit", "r.toml", *words)
-    assert done.returncode not in (0, 70)
+    assert done.returncode != 0
     assert said in done.stderr
     assert not (tmp_path / "f.toml").exists()
 
