@@ -352,9 +352,7 @@ def check_colours(path: str | os.PathLike[str], codec: str | None, clip: Clip, a
     if container is None and suffix == ".png":
         return
     stream = Stream(clip.alpha, clip.bits, colours=clip.colours)
-    others = "" if stream.is_shallow else ", .mkv, .mp4 with --codec h265, .webm with --codec av1,"
-    mend = f"write .mov{others} or name.%04d.png"
-    _check_told(path, codec, container, stream, f"the colours of {clip.path} are {named}", mend)
+    _check_told(path, codec, container, stream, f"the colours of {clip.path} are {named}")
 
 
 def check_colours_of_picture(
@@ -372,17 +370,26 @@ def check_colours_of_picture(
         return
     container = ANIMATIONS.get(Path(path).suffix.lower()) if kind is None else None
     colours = uncoded(picture.chunks)
-    stream = Stream(picture.has_alpha, min(picture.bits, 16), colours=colours or USUAL)
-    videos = "" if colours is None else ".mov or " if stream.is_shallow else ".mov, .mkv or "
-    mend = "write .png" if kind is not None else f"write {videos}name.%04d.png"
-    _check_told(path, codec, container if colours else None, stream, f"the picture's colours are {named}", mend)
+    stream = colours and Stream(picture.has_alpha, min(picture.bits, 16), colours=colours)
+    _check_told(path, codec, container, stream, f"the picture's colours are {named}", kind is not None)
 
 
 def _check_told(
-    path: str | os.PathLike[str], codec: str | None, container: Container | None, stream: Stream, what: str, mend: str
+    path: str | os.PathLike[str],
+    codec: str | None,
+    container: Container | None,
+    stream: Stream | None,
+    what: str,
+    is_still: bool = False,
 ) -> None:
-    """Raise `UserError` for colours that a file of this kind cannot tell, as only some videos can."""
-    if container is None or Path(path).suffix.lower() not in (".mp4", ".webm", ".mkv", ".mov"):
+    """Raise `UserError` for colours that a file of this kind cannot tell, as only some videos can.
+
+    stream: what of them a video would be made of; None if none can tell them.
+    """
+    others = "" if stream is None or stream.is_shallow else ", .mkv, .mp4 with --codec h265, .webm with --codec av1,"
+    videos = f".mov{others} or " if stream is not None else ""
+    mend = "write .png" if is_still else f"write {videos}name.%04d.png"
+    if stream is None or container is None or Path(path).suffix.lower() not in (".mp4", ".webm", ".mkv", ".mov"):
         raise UserError(f"Cannot write {path}: it cannot tell that {what}; {mend}.")
     options = container.encoding(codec)(stream)
     if stream.colours.is_high and depth_of(options[options.index("-pix_fmt") + 1])[0] < 10:
