@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import sys
 from collections import Counter
 from collections.abc import Sequence
@@ -433,22 +434,14 @@ def _perform_many(tasks: Sequence[Piece], jobs: int, cluster: str | None, verbos
     from app.work.tasks import NAME
 
     written, repeated = 0, Counter[str]()
-    first_of = dict[str, str]()  # what was told first, by its words, and by those without the picture's name
-    common = dict[str, str]()  # what is said of all further ones, by what was told first
     failed: list[Outcome] = []
 
     def new(label: str, *notices: str) -> list[str]:
-        found = list[str]()
-        for said in notices:
-            # The name of 8.png is in all that has an 8 in it, so the very same words are alike whatever the names are.
-            alike = said.replace(Path(label).stem, NAME)
-            first = first_of.get(said) or first_of.get(alike) or said
-            if verbose or first not in repeated:
-                found.append(said)
-            first_of.setdefault(said, first)
-            first_of.setdefault(alike, first)
-            common[first] = said if said == first else alike
-            repeated[first] += 1
+        # Without the picture's name, which is taken out of names of files alone: that of 8.png is in many a number.
+        own = re.compile(rf"(?<![^\W_]){re.escape(Path(label).stem)}(?![^\W_])(?=\S*\.[A-Za-z])")
+        alike = {said: own.sub(NAME, said) for said in notices}
+        found = [said for said in notices if verbose or alike[said] not in repeated]
+        repeated.update(alike.values())
         return found
 
     def warn(label: str, said: str) -> None:
@@ -471,7 +464,7 @@ def _perform_many(tasks: Sequence[Piece], jobs: int, cluster: str | None, verbos
     except Cancelled:
         _fail(f"cancelled; {written} of {many} are written, nothing is half-written", INTERRUPTED)
     if not verbose:
-        _tell(*(f"and of {count - 1} more: {common[said]}" for said, count in repeated.items() if count > 1))
+        _tell(*(f"and of {count - 1} more: {said}" for said, count in repeated.items() if count > 1))
     if failures and len(tasks) == 1:
         raise typer.Exit(1)
     if failures:

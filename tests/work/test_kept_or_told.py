@@ -807,17 +807,18 @@ def test_what_belongs_to_an_animated_picture_is_kept_or_told(tmp_path: Path, flu
             assert thing.kept(seen(tmp_path / output)) != bool(re.search(thing.told, ran.stderr)), (key, ran.stderr)
 
 
-def test_what_many_pictures_lose_alike_is_told_of_the_first(tmp_path: Path, fluidwarp: Run) -> None:
+@pytest.mark.parametrize("output", ["{name}.exr", "to_{name}_2.exr"])
+def test_what_many_pictures_lose_alike_is_told_of_the_first(tmp_path: Path, fluidwarp: Run, output: str) -> None:
     (tmp_path / "still.toml").write_text(RECIPE)
     (tmp_path / "out").mkdir()
     for number in range(4):
         Image.fromarray(smooth()).save(tmp_path / f"p{number}.jpg", xmp=XMP if number else b"")
     names = [f"p{number}.jpg" for number in range(4)]
-    ran = fluidwarp(tmp_path, "render", "still.toml", *names, "-o", "out/{name}.exr")
+    ran = fluidwarp(tmp_path, "render", "still.toml", *names, "-o", f"out/{output}")
     said = "lacks the picture's XMP; write .png to keep it"
     assert ran.returncode == 0
     assert ran.stderr == (
-        f"fluidwarp: {tmp_path}/p1.jpg: p1.exr {said}\nfluidwarp: and of 2 more: {{name}}.exr {said}\n"
+        f"fluidwarp: {tmp_path}/p1.jpg: {output.format(name='p1')} {said}\nfluidwarp: and of 2 more: {output} {said}\n"
     )
 
 
