@@ -1844,7 +1844,7 @@ def test_a_grid_far_finer_than_a_picture_is_told_while_that_is_exported(robot: R
     recipe = Recipe(force=(push,), duration=60.0, fluid=FluidSettings(grid=388))
     small = Picture(np.zeros((48, 64, 3), np.uint8))
     robot.editor.exports.start(Job(recipe, small, tmp_path, Outputs(tmp_path / "small.png")))
-    robot.until(lambda: robot.editor.messages.shown)
+    robot.until(lambda: bool(robot.editor.messages.shown))
     assert robot.editor.exports.is_running
     (told,) = robot.editor.messages.shown
     assert told.text.startswith("A grid of 388 cells is 6.06 times as fine as the picture of 64 x 48 pixels")
