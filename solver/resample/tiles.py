@@ -62,7 +62,8 @@ def halves_of(region: Region) -> tuple[Region, Region]:
 
 def rectangles(mask: np.ndarray) -> np.ndarray:
     """What is true in a mask as rectangles, (n, 4) of x, y, width and height: runs in its rows, joined downwards."""
-    padded = np.pad(mask, ((0, 0), (1, 1)))
+    padded = np.zeros((mask.shape[0], mask.shape[1] + 2), bool)  # by `np.pad` five times as slow
+    padded[:, 1:-1] = mask
     rows, edges = np.nonzero(padded[:, 1:] != padded[:, :-1])
     found: list[list[int]] = []
     above: dict[tuple[int, int], list[int]] = {}
