@@ -303,7 +303,7 @@ def _origin(told: dict[str, Any]) -> Origin:
     flags = origin.embedded, origin.inside
     if not all(isinstance(flag, bool) for flag in flags) or (origin.inside and origin.path is None):
         raise ValueError
-    for text in (origin.name, origin.folder, origin.path or ""):
+    for text in (origin.name, origin.folder, "" if origin.path is None else origin.path):
         _text(text)
     for number in (origin.size, origin.crc):
         _count(number)

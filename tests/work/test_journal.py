@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import random
 import zlib
-from dataclasses import asdict, replace
+from collections.abc import Callable
+from dataclasses import asdict, fields, replace
 from itertools import pairwise
 from typing import Any
 
@@ -199,28 +200,53 @@ def test_a_record_that_says_what_none_can_costs_nothing_before_it(record: Any) -
         assert not read(data + line(record)[:-3])[1].is_cut
 
 
-@pytest.mark.parametrize(
-    "part",
-    [
-        {"path": 7},
-        {"path": "/a\0"},
-        {"name": None},
-        {"folder": ["/"]},
-        {"size": -1},
-        {"size": 1.0},
-        {"crc": "7"},
-        {"embedded": 1},
-        {"inside": True},
-        {"more": 1},
-    ],
-    ids=json.dumps,
-)
-def test_a_journal_of_pictures_that_are_nowhere_is_damaged(part: dict[str, Any]) -> None:
+def is_count(value: object) -> bool:
+    return type(value) is int and value >= 0
+
+
+def is_name(value: object) -> bool:
+    return isinstance(value, str) and "\0" not in value
+
+
+VALID: dict[str, Callable[[object], bool]] = {
+    "name": is_name,
+    "folder": is_name,
+    "path": lambda value: value is None or is_name(value),
+    "embedded": lambda value: isinstance(value, bool),
+    "inside": lambda value: isinstance(value, bool),
+    "size": is_count,
+    "crc": is_count,
+    "seen": lambda value: value is None or (isinstance(value, list) and all(type(one) is int for one in value)),
+}
+VALUES = [None, True, False, -1, 0, 7, 1.0, "", "/a", "7", "/a\0", [], [1, -4], [1, 2.0], [True], ["1"], [[1]], {}]
+
+
+@pytest.mark.parametrize("key", [field.name for field in fields(Origin)])
+def test_a_journal_of_pictures_that_are_nowhere_is_damaged(key: str) -> None:
+    """Whatever stands for a part that is no such thing, or is not there; and a part that there is not."""
     head, *_ = beginning(ORIGIN, Work((Entry("Open", Recipe(), 0),), 0, Recipe()))
-    first = {"origin": asdict(ORIGIN), "add": [["Open", 0, {}]], "index": 0}
-    assert read(head + line(first))[0] == ORIGIN
+    origin = asdict(replace(ORIGIN, path="/a.fluidwarp"))
+
+    def read_with(**parts: object) -> Origin:
+        return read(head + line({"origin": origin | parts, "add": [["Open", 0, {}]], "index": 0}))[0]
+
+    for value in VALUES:
+        if VALID[key](value):
+            assert getattr(read_with(**{key: value}), key) == (tuple(value) if isinstance(value, list) else value)
+        else:
+            with pytest.raises(Damaged):
+                read_with(**{key: value})
+    del origin[key]
+    if key == "seen":  # which journals did not have at first
+        assert read_with().seen is None
+    else:
+        with pytest.raises(Damaged):
+            read_with()
+    origin[key] = getattr(ORIGIN, key)
     with pytest.raises(Damaged):
-        read(head + line(first | {"origin": first["origin"] | part}))
+        read_with(more=1)
+    with pytest.raises(Damaged):
+        read_with(inside=True, path=None)
 
 
 def test_names_that_are_not_utf8_come_back() -> None:
