@@ -129,6 +129,7 @@ class Editing(Painting):
         Raises:
             UserError: if it would take too long to arrive.
         """
+        self.release()
 
         def changed(led: RecipeHandle | RecipePin) -> RecipeHandle | RecipePin:
             led = led.model_copy(update=settings)

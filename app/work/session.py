@@ -119,6 +119,7 @@ class Session(Playing):
 
     def set_grid(self, cells: int, name: str = "Quality") -> None:
         """Simulate on another grid, by replaying all that has been done; from now on it is the person's choice."""
+        self.release()
         self.is_grid_automatic = False
         self.forget_grid()
         if cells != self._live.fluid.grid:

@@ -15,7 +15,7 @@ from app.errors import UserError
 from app.media import project as projects
 from app.media.pictures import write_picture
 from app.model import edits, toml
-from app.model.bars import Which
+from app.model.bars import Actor, Which
 from app.model.forces import VortexForce
 from app.model.handles import RecipeHandle
 from app.model.mask_edits import LONGEST_HAND, InvertMask, MaskStroke, mask_edit
@@ -666,6 +666,25 @@ def test_quick_strokes_wait_for_one_another_and_all_act_in_full(
     again.release_gpu()
 
 
+def test_what_waits_is_what_the_simulation_has_not_come_to_the_end_of(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And where the playhead has been sent somewhere, nothing waits."""
+    monkeypatch.setattr("app.work.playing.QUICK", 0.0)  # a machine on which every tick takes a frame
+    for number in range(3):
+        strike(session, number)
+    strokes, seen = session.recipe.stroke, list[int]()
+    while session.coasting:
+        assert session.waiting == [one for one in strokes if one.end_tick >= session.tick]
+        seen.append(len(session.waiting))
+        session.advance(1)
+    assert sorted({*seen}) == [0, 1, 2, 3]
+    strike(session, 0)
+    assert len(session.waiting) == 1
+    session.seek(0)
+    assert session.waiting == []
+
+
 def test_undo_takes_exactly_the_last_of_the_waiting_strokes(session: Session) -> None:
     strike(session, 0)
     strike(session, 1)
@@ -1092,3 +1111,73 @@ def test_a_push_that_stays_holds_a_fluid_that_moves(session: Session) -> None:
 )  # fmt: skip
 def test_places_are_kept_half_a_picture_around_it_to_five_digits(given: Point, kept: Point) -> None:
     assert kept_near(*given) == kept
+
+
+def muted(one: Actor) -> Actor:
+    return one.model_copy(update={"muted": True})
+
+
+ACTS: dict[str, Callable[[Session], object]] = {
+    "edit": lambda session: session.edit("Amount", amount=0.5),
+    "preview": lambda session: session.preview(amount=0.5),
+    "edit_bars": lambda session: session.edit_bars("Mute", {("stroke", 0)}, muted),
+    "edit_held": lambda session: session.edit_held("Set", "handle[1]", stiffness=0.5),
+    "edit_masks": lambda session: session.edit_masks("Fill", mask_edit(TRIANGLE)),
+    "change": lambda session: session.change("Drag", drag=20.0),
+    "preview_change": lambda session: session.preview_change(drag=20.0),
+    "let_go": lambda session: session.let_go("handle[1]"),
+    "start_from_map": lambda session: session.start_from_map("m.npy"),
+    "set_grid": lambda session: session.set_grid(20),
+    "repeat": lambda session: session.repeat(False, True),
+    "undo": lambda session: session.undo(),
+    "redo": lambda session: session.redo(),
+    "go_to": lambda session: session.go_to(1),
+    "seek": lambda session: session.seek(2),
+    "play": lambda session: session.play(),
+    "pause": lambda session: session.pause(),
+    "step": lambda session: session.step(),
+    "stop_recording": lambda session: session.stop_recording(),
+}
+BEGUN = ["push", "thicken", "handle", "lead on"]
+
+
+@pytest.mark.parametrize("begun", BEGUN)
+def test_whatever_is_done_while_a_gesture_is_open_is_done_as_if_it_had_been_ended_just_before(
+    device: Device, tmp_path: Path, begun: str
+) -> None:
+    """The brush is still on its way to the pen, so that a stroke that ends is not what it was so far."""
+    project = small_project(tmp_path, grid=16)
+    np.save(tmp_path / "m.npy", np.zeros((12, 16, 2), np.float32))
+    push = Stroke(tool="push", samples=((0, 0.3, 0.6, 1.0), (3, 0.4, 0.6, 1.0)))
+
+    def after(act: Callable[[Session], object], ends: bool) -> list[object]:
+        session = Session(device, project)
+        dt, extent = session.dt, session.extent
+        led = RecipeHandle(at=(0.3, 0.3), to=(0.4, 0.3), duration=3 * dt)
+        session.edit("Begin", stroke=(push,), handle=(led,), duration=6 * dt)
+        session.seek(session.end)
+        session.settle()
+        press = Press(BrushSettings(0.2, 0.2), False, extent, dt, string=0.1)
+        held = session.held[0] if begun == "lead on" else None
+        x, y = held.now if held is not None else (0.6, 0.5)
+        session.press(TOOL["handle" if held is not None else begun], press, x, y, held=held)
+        for part in range(1, 4):
+            session.move(x + part / 12, y + part / 20)
+            session.advance(1)
+        assert session.is_painting
+        if ends:
+            session.release()
+        act(session)
+        assert not session.is_painting
+        history = session.document.history
+        told = [session.recipe, history.entries, history.index, session.playing, session.coasting, session.target]
+        session.pause()
+        session.settle()
+        told += [session.recipe, history.entries, session.tick, session.replay.warp.read().tobytes()]
+        session.release_gpu()
+        return told
+
+    for name, act in ACTS.items():
+        open_, ended = (after(act, ends) for ends in (False, True))
+        for number, (one, other) in enumerate(zip(open_, ended, strict=True)):
+            assert one == other, (name, number)
