@@ -9,6 +9,7 @@ import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache, partial
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -28,10 +29,12 @@ from app.media.formats import ONLY_READ, TABLE
 from app.media.holding import unheld
 from app.media.maps import write_map
 from app.media.pictures import read_picture, write_picture
+from app.media.source import open_source
 from app.model.picture import Picture
 from app.progress import Progress
+from app.work.apply_job import Application, MapSource
 from app.work.jobs import Outputs
-from app.work.tasks import Edits, Task
+from app.work.tasks import Edits, Piece, Task
 from solver.gl.device import Device
 from support.commands import Run
 
@@ -647,33 +650,45 @@ def made(name: str, folder: Path) -> tuple[Path, Made]:
     return path, SOURCES[name](path)
 
 
-def rendered(device: Device, folder: Path, path: Path, outputs: Outputs) -> tuple[list[str], Seen | None]:
+def outcome_of(device: Device, piece: Piece) -> tuple[list[str], Seen | None]:
     """What is told of what is made of a picture that nothing moves, and what is in it; None where it is refused."""
-    recipe = folder / "still.toml"
-    task = Task(recipe=str(recipe), edits=Edits(), picture=path, outputs=outputs)
     try:
-        said = list(task.perform(lambda: device, Progress()).notices)
+        said = list(piece.perform(lambda: device, Progress()).notices)
     except UserError as error:
         return [str(error)], None
-    assert outputs.file is not None
-    return said, seen(outputs.file)
+    assert piece.outputs.file is not None
+    return said, seen(piece.outputs.file)
 
 
-def check_pair(device: Device, folder: Path, name: str, output: Path, bits: int | None, is_moving: bool) -> None:
-    path, things = made(name, folder)
-    said, found = rendered(device, folder, path, Outputs(output, bits=bits, animated=is_moving, recorded=False))
+def rendered(device: Device, folder: Path, path: Path, outputs: Outputs) -> tuple[list[str], Seen | None]:
+    """See `outcome_of`."""
+    recipe = folder / "still.toml"
+    return outcome_of(device, Task(recipe=str(recipe), edits=Edits(), picture=path, outputs=outputs))
+
+
+def is_all_kept_or_told(things: Made, said: list[str], found: Seen | None) -> bool:
+    """False where it is refused, for something that it could not tell."""
     lines = "\n".join(said)
     told = {key for key, thing in things.items() if re.search(thing.told, re.sub(rf".*{SAYS_HOW}.*", "", lines))}
     kept = {key for key, thing in things.items() if found is not None and thing.kept(found)}
     if found is None:
         assert "Cannot write" in lines
         assert told  # what it is refused for
-        return
+        return False
     assert not told & kept, (told & kept, lines)
     assert told | kept == set(things), (set(things) - told - kept, lines)
     assert len(said) <= 2, said
     if kept == set(things):
         assert not re.sub(rf".*{SAYS_HOW}.*", "", lines), lines
+    return True
+
+
+def check_pair(device: Device, folder: Path, name: str, output: Path, bits: int | None, is_moving: bool) -> None:
+    path, things = made(name, folder)
+    said, found = rendered(device, folder, path, Outputs(output, bits=bits, animated=is_moving, recorded=False))
+    lines = "\n".join(said)
+    if not is_all_kept_or_told(things, said, found):
+        return
     better = re.search(r"write (\.\w+) to keep", lines)
     if better is not None:
         lost = {key for key in things if re.search(things[key].told, said[-1])}
@@ -688,6 +703,28 @@ def test_a_still_keeps_what_it_has_or_it_is_told(device: Device, folder: Path, n
     for ending, bits in STILLS:
         output = folder / f"{name}-{bits}{ending}"
         check_pair(device, folder, name, output, bits, False)
+
+
+@pytest.mark.parametrize("name", SOURCES)
+def test_a_still_keeps_what_it_has_or_it_is_told_whichever_way_it_is_warped(
+    device: Device, folder: Path, name: str
+) -> None:
+    """By a recipe or a map, in its own size or another: beyond the display window not all of them warp it."""
+    path, things = made(name, folder)
+    picture = open_source(path).picture
+    nothing = np.zeros((picture.height, picture.width, 2), np.float32)
+    for forward in (False, True):
+        write_map(folder / f"{forward}.exr", Displacement(nothing, 0, forward))
+    for number, (way, size) in enumerate(product(("recipe", "False.exr", "True.exr"), (None, 2 * picture.width))):
+        outputs = Outputs(folder / f"{name}-{number}.exr")
+        if way == "recipe":
+            edits = Edits.of({"output": {"size": size}}, {})
+            piece = Task(recipe=str(folder / "still.toml"), edits=edits, picture=path, outputs=outputs)
+        else:
+            piece = Application(maps=MapSource(folder / way), picture=path, outputs=outputs, size=size)
+        said, found = outcome_of(device, piece)
+        assert found is None or found.values.shape[1] == (size or picture.width)
+        is_all_kept_or_told(things, said, found)
 
 
 MOVED = [
