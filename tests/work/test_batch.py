@@ -179,7 +179,8 @@ def test_what_a_process_elsewhere_is_given_depends_on_no_present_folder(
     [
         ("out", ["a/x.png", "b/x.png"], "would both become"),
         (".", ["x.png", "y.png"], "replaced by its own result"),
-        ("x.png", ["a.png", "b.png"], "{name}"),
+        ("x.png", ["a.png", "b.png"], r"^2 pictures cannot all become x\.png; write a folder, or out/\{name\}\.png$"),
+        ("x.png", ["a.png"], r"^a picture of a cluster cannot become x\.png; write a folder, or out/\{name\}\.png$"),
         ("{name}-w.png", ["a.png", "a-w.png"], "a-w.png would be replaced by what a.png becomes"),
     ],
 )
@@ -278,6 +279,8 @@ def test_a_process_that_dies_is_replaced(folder: Path, monkeypatch: pytest.Monke
     assert sorted(told) == [path.name for path in pictures]
     assert [name for name, error in told.items() if error] == ["p3.png"]
     assert told["p3.png"] == worker.DIED
+    # What has died is tried again when no other has anything in memory.
+    assert {path.name: path.read_text() for path in folder.glob("*.beside")} == {"p0.beside": "0", "p3.beside": "0"}
 
 
 def test_cancelling_leaves_what_is_finished(folder: Path):
@@ -434,6 +437,16 @@ def test_what_a_terminal_tells_all_of_its_processes_the_ones_that_work_do_not_he
 
 
 # A cluster ----------------------------------------------------------------------------------------------------------
+
+
+def test_without_dask_a_cluster_is_a_sentence_with_the_status_of_wrong_words(
+    folder: Path, fluidwarp: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    ran = fluidwarp(folder, "render", "a.toml", "p0.png", "-o", "out", "--cluster", "tcp://127.0.0.1:1")
+    assert ran.stderr == "fluidwarp: a cluster needs Dask; install it with: pip install 'fluidwarp[cluster]'\n"
+    assert ran.returncode == 2
+    assert not (folder / "out").exists()
 
 
 def test_a_cluster_loses_a_worker_and_nothing_else(folder: Path):

@@ -708,3 +708,25 @@ def test_a_file_that_another_program_writes_meanwhile_is_not_replaced_without_a_
     line = f"{name}: another program wrote this file while it was being made; what that wrote is replaced"
     assert said(lambda: file.write_text("of another")) == ([] if is_sequence(name) else [line])
     assert is_sequence(name) or file.read_bytes() != b"of another"
+
+
+def test_a_still_of_a_clip_s_frame_is_that_file_of_the_sequence(device: Device, tmp_path: Path) -> None:
+    """Also where the recipe looks at other frames; once the fluid has come to its end all frames have the same warp."""
+    for number in range(5, 10):
+        pixels = scene(number)
+        pixels[:, 10 * number - 40 : 10 * number - 20] = 255
+        write_picture(tmp_path / f"f.{number}.png", Picture(pixels))
+    looks = '[[mask]]\nkind = "picture"\nof = "frozen"\npicture = "source"\ntick = 0\nframe = 3\nwhite = 0.9\n'
+    recipe = Recipe.parse(WHIRL.replace("duration = 0.4", "duration = 0.2") + looks)
+    source = open_source(tmp_path / "f.%d.png")
+    assert source.clip is not None
+    moving = Job(recipe, source.picture, tmp_path, Outputs(tmp_path / "w.%d.png"), clip=source.clip)
+    run(device, moving, Progress())
+    others = set[bytes]()
+    for number in (8, 9):
+        outputs = Outputs(tmp_path / "still.png")
+        run(device, Job(recipe, source.picture, tmp_path, outputs, frame=(source.clip, number)), Progress())
+        found, wanted = (read_picture(tmp_path / name).pixels for name in ("still.png", f"w.{number}.png"))
+        assert np.array_equal(found, wanted)
+        others.add(found.tobytes())
+    assert len(others) == 2

@@ -317,6 +317,7 @@ def test_what_is_turned_is_turned_at_the_end_as_it_was_and_a_line_that_stays_is_
     ]
     stays = recipe.handle[2]
     assert (stays.points, stays.closed, stays.goal) == (((0.7, 0.2), (0.8, 0.2), (0.8, 0.4)), True, None)
+    assert (stays.start, stays.end) == (0.0, None)  # all is held at once, as all goes at once
 
 
 def test_what_is_pinned_between_strokes_is_pinned_then(device: Device):
@@ -481,6 +482,44 @@ def test_no_more_is_tried_than_was_asked_for(device: Device, monkeypatch: pytest
     monkeypatch.setattr(fitting, "Replay", counted)
     fit(device, PAIRS, 9, RECIPE.replace("grid = 32", "grid = 66").replace("duration = 0.4", "duration = 0.08"))
     assert 7 <= tried.count(fitting.COARSE_GRID) <= 9
+
+
+def test_as_little_as_there_is_to_try_is_tried(device: Device, monkeypatch: pytest.MonkeyPatch):
+    """All replays that there are, but for a single one, which leads a search nowhere."""
+    many, tried = np.repeat(PAIRS, 7, axis=0) + np.linspace(0, 0.05, 14)[:, None, None], list[int]()
+
+    def counted(device: Device, recipe: Recipe, *given: Any, **named: Any) -> Replay:
+        tried.append(recipe.fluid.grid)
+        return Replay(device, recipe, *given, **named)
+
+    monkeypatch.setattr(fitting, "Replay", counted)
+    found = []
+    for evaluations in range(1, 5):
+        tried.clear()
+        fit(
+            device,
+            many,
+            evaluations,
+            FREE.replace("grid = 32", "grid = 66").replace("duration = 0.8", "duration = 0.08"),
+        )
+        found.append(tried.count(fitting.COARSE_GRID))
+    assert found == [1, 1, 3, 4]
+
+
+def test_the_work_is_the_strain_of_all_of_the_way(device: Device):
+    """The integral over time of the root mean square of the velocity's gradient.
+
+    What flows at the ends of ticks, which is looked at here, is nearly what carries the picture in them.
+    """
+    trial = fit(device, PAIRS, 1, FREE).trial
+    replay, work, dt = Replay(device, trial.recipe, Pictures(PICTURE), budget=0), 0.0, trial.recipe.fluid.dt
+    for _ in range(trial.recipe.ticks):
+        replay.advance()
+        velocity, (hx, hy) = replay.fluid.velocity_at_centres(), replay.fluid.grid.spacing
+        squares = sum(np.gradient(velocity, step, axis=axis) ** 2 for step, axis in ((hx, 1), (hy, 0)))
+        work += float(np.sqrt(squares.sum() * hx * hy / EXTENT.prod())) * dt
+    replay.release()
+    assert trial.work == pytest.approx(work, rel=0.1)
 
 
 def test_stopped_it_gives_the_best_so_far_checked_on_its_own_grid(device: Device):

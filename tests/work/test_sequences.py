@@ -477,6 +477,9 @@ def test_apply_goes_on(folder: Path, fluidwarp: Run):
     assert fluidwarp(folder, *words, "--resume").stderr == "fluidwarp: 3 of 4 frames were whole and are kept\n"
     assert len(made(folder)) == 4
     assert before.items() <= inodes(folder).items()
+    write_exr(folder / "plate.1002.exr", 7)
+    assert fluidwarp(folder, *words, "--resume").stderr == "fluidwarp: 3 of 4 frames were whole and are kept\n"
+    assert (channels(folder / "w.1002.exr")["Z"] == 7).any()
     write_map(folder / "m.npy", Displacement(np.full((HEIGHT, WIDTH, 2), 0.06, np.float32)))
     assert fluidwarp(folder, *words, "--resume").stderr == ""
 
