@@ -268,6 +268,20 @@ def test_the_fluid_comes_to_rest_and_stays_so(session: Session) -> None:
     assert session.tick == tick == session.end == session.document.recipe.ticks
 
 
+def test_a_handle_that_comes_no_nearer_keeps_nothing_going(session: Session) -> None:
+    """It is too soft, and would be waited for as long as anything is: a minute."""
+    press = Press(BrushSettings(0.2, stiffness=0.01), False, session.extent, session.dt)
+    session.press(TOOL["handle"], press, 0.4, 0.5)
+    session.move(0.6, 0.5)
+    session.advance(1)
+    session.release()
+    for _ in range(100):
+        session.advance(1)
+    assert not session.coasting
+    (missed,) = session.unmet.values()
+    assert "it gives way to the fluid" in missed.said
+
+
 def test_a_stroke_goes_on_beyond_the_edges_by_half_a_picture(session: Session) -> None:
     paint(session, "freeze", (0.9, 0.1), (3.0, -2.0), ticks=1)
     painted = session.recipe.mask[-1]
