@@ -274,7 +274,7 @@ def test_a_process_that_dies_is_replaced(folder: Path, monkeypatch: pytest.Monke
     monkeypatch.setattr(worker, "SERVING", "import support.dying as d, app.work.worker as w; w.serve(d.dying)")
     pictures = [folder / f"p{number}.png" for number in range(4)]
     heard: list[Outcome] = []
-    assert run_batch(tasks(folder, pictures), heard.append, Progress(), 2) == 1
+    assert run_batch(tasks(folder, pictures), heard.append, Progress(), 3) == 1
     told = {Path(outcome.label).name: outcome.error for outcome in heard}
     assert sorted(told) == [path.name for path in pictures]
     assert [name for name, error in told.items() if error] == ["p3.png"]
