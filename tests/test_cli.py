@@ -1066,6 +1066,15 @@ def test_a_map_is_turned_round(folder: Path, fluidwarp: Run):
     turned = read_map(folder / "n.npy").values
     np.testing.assert_allclose(turned[:, 4:-4, 0], np.tile(np.interp(x, x + moved, -moved)[4:-4], (48, 1)), atol=1e-3)
     np.testing.assert_allclose(turned[..., 1], 0, atol=1e-5)
+    # What the map of a file says of its direction is turned round with it, and back.
+    write_map(folder / "m.exr", Displacement(values))
+    for name, other, forward in (("m.exr", "n.exr", True), ("n.exr", "o.exr", False)):
+        assert fluidwarp(folder, "convert", name, "-o", other, "--invert").returncode == 0
+        assert read_map(folder / other).forward is forward
+    for name in ("m.exr", "n.exr"):
+        assert fluidwarp(folder, "apply", name, "cat.png", "-o", f"{name}.png").returncode == 0
+    found, wanted = (read_picture(folder / f"{name}.png").pixels.astype(float) for name in ("n.exr", "m.exr"))
+    assert np.abs(found - wanted)[:, 4:-4].mean() < 0.5
 
 
 def test_a_clip_that_is_cut_during_the_job_is_a_failure_with_its_own_status(

@@ -297,6 +297,20 @@ def test_without_pairs_the_recipe_s_own_handles_are_fitted_and_all_keep_their_nu
         fit(device, None)
 
 
+@pytest.mark.parametrize("local", [None, 0.0, 0.25])
+def test_what_is_fitted_is_as_local_as_is_asked_for_and_else_as_it_is_or_has_to_be(device: Device, local: float | None):
+    """What is not fitted, as it is muted or goes nowhere, stays as it is."""
+    own: list[float | None] = [None, 0.0, 0.0, None]
+    for pairs, recipe, kept, usual in (
+        (Pairs.points(PAIRS), FREE, [None, None], (0.0, 0.0)),
+        (Pairs(PAIRS, ("stem", "stem")), FREE, [None, None], (1.0, 1.0)),
+        (None, RECIPE + HANDLES, own, (0.0, 0.0, 0.0, 0.5)),
+    ):
+        found = Fit(Recipe.parse(recipe), PICTURE, Path(), pairs, 1, local).perform(device, Progress()).trial.recipe
+        asked = [local if stays is None else stays for stays in kept]
+        assert [handle.local for handle in found.handle] == [*(usual if local is None else asked)]
+
+
 def test_what_an_animation_shows_of_a_long_recipe_is_still_there_once_it_is_fitted(device: Device):
     """Two seconds are enough for handles, and its [time] began behind them."""
     led = "[[handle]]\nat = [0.3, 0.4]\nto = [0.36, 0.43]\n"
