@@ -197,6 +197,16 @@ def test_one_file_of_numbers_for_many_pictures_is_refused(tmp_path: Path):
         spread(order("coffee", None, Outputs(tmp_path, stats=tmp_path / "s.json")), [Path("a.png"), Path("b.png")])
 
 
+@pytest.mark.parametrize("name", ["file", "file/out", "file/out/deeper"])
+def test_a_folder_that_cannot_be_made_is_told_once_before_any_picture_is_read(
+    folder: Path, fluidwarp: Run, name: str
+) -> None:
+    (folder / "file").touch()
+    ran = fluidwarp(folder, "render", "a.toml", "p0.png", "gone.png", "-o", name)
+    assert ran.returncode == 1
+    assert re.fullmatch(rf"fluidwarp: Cannot write {name}: .*file.*\n", ran.stderr)
+
+
 def test_numbers_of_two_pictures_in_one_file_are_refused(tmp_path: Path):
     with pytest.raises(UserError, match="would both become"):
         spread(
