@@ -33,10 +33,11 @@ from app.progress import INTERRUPTED, Progress
 from app.work import cluster, states, worker
 from app.work.apply_job import Application, MapSource
 from app.work.batch import run_batch
-from app.work.jobs import MapOutput, Outputs
+from app.work.fit_job import Fit
+from app.work.jobs import Job, MapOutput, Outputs
 from app.work.replay import Replay
 from app.work.tasks import Edits, Task, named, spread
-from app.work.worker import Outcome, Status, perform
+from app.work.worker import Outcome, Status, Work, perform
 from solver.gl.context import NoSuchDevice
 from solver.gl.device import Device
 from support.commands import Run
@@ -233,6 +234,46 @@ def test_a_missing_device_is_told_as_it_is(folder: Path, monkeypatch: pytest.Mon
     monkeypatch.setattr(worker, "own_device", none)
     told = perform(order(folder / "a.toml", folder / "p0.png", Outputs(folder / "x.png")), Progress())
     assert told.error == told.in_window == "graphics device 7 is not there; there is only 0"
+
+
+@pytest.mark.parametrize(
+    ("error", "told", "in_window"),
+    [
+        (UserError("it is so", in_window="so it is"), "it is so", "so it is"),
+        (
+            MemoryError(),
+            "there is not enough memory for it; use fewer --jobs or a smaller --size",
+            "there is not enough memory for it; choose a smaller size",
+        ),
+        (ValueError("one\n  two"), "ValueError: one two", "{} failed: one two"),
+        (KeyError(), "KeyError: no reason given", "{} failed: no reason given"),
+        (Cancelled(), None, None),
+    ],
+    ids=lambda value: type(value).__name__ if isinstance(value, Exception) else "",
+)
+def test_whatever_goes_wrong_with_a_piece_of_work_is_told_in_a_line(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, error: Exception, told: str | None, in_window: str | None
+):
+    """Of each kind of work; a fit that is stopped before it has found anything tells nothing."""
+
+    def failing() -> Device:
+        raise error
+
+    monkeypatch.setattr(worker, "own_device", failing)
+    picture, recipe, outputs = read_picture(folder / "p0.png"), Recipe.parse(RECIPE), Outputs(folder / "x.png")
+    works: list[tuple[Work, str]] = [
+        (order(folder / "a.toml", folder / "p0.png", outputs), "The export"),
+        (Job(recipe, picture, folder, outputs), "The export"),
+        (Fit(recipe, picture, folder), "The fit"),
+    ]
+    for work, what in works:
+        if told is not None and in_window is not None:
+            assert perform(work, Progress()) == Outcome(work.label, told, in_window.format(what))
+        elif isinstance(work, Fit):
+            assert perform(work, Progress()) == Outcome(work.label)
+        else:
+            with pytest.raises(Cancelled):
+                perform(work, Progress())
 
 
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="counts threads as Linux tells them")

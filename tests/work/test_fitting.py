@@ -616,6 +616,24 @@ def test_the_command_line_writes_a_recipe_and_where_the_points_arrive(fluidwarp:
     assert fluidwarp(tmp_path, "render", "out/f.toml", "-o", "out/f.png").returncode == 0
 
 
+def test_a_recipe_that_names_other_pictures_is_fitted_beside_them_alone(fluidwarp: Run, tmp_path: Path):
+    """Or where their names say all of where they are."""
+    for name in ("a.png", "mask.png"):
+        write_picture(tmp_path / name, PICTURE)
+    (tmp_path / "p.csv").write_text("10,10,12,12\n")
+    (tmp_path / "out").mkdir()
+    for name, named, refused in (
+        ("out/f.toml", "mask.png", "out/f.toml: write it beside r.toml, which names mask.png from there"),
+        ("out/f.toml", tmp_path / "mask.png", None),
+        ("f.toml", "mask.png", None),
+    ):
+        layer = f"[[viscosity]]\nkind = 'picture'\npicture = '{named}'\nrange = [0.01, 0.1]\n"
+        (tmp_path / "r.toml").write_text('picture = "a.png"\n' + RECIPE + layer)
+        done = fluidwarp(tmp_path, "fit", "r.toml", "--pairs", "p.csv", "-o", name, "--evaluations", "1")
+        assert (done.returncode, (tmp_path / name).exists()) == ((0, True) if refused is None else (1, False))
+        assert refused is None or done.stderr == f"fluidwarp: {refused}\n"
+
+
 def test_what_is_fitted_from_is_not_written_over(tmp_path: Path):
     given = {name: tmp_path / f"{name}.csv" for name in ("pairs", "first", "second", "image", "recipe")}
     job = FitJob(
