@@ -13,6 +13,7 @@ import pytest
 
 from app.errors import UserError
 from app.media.auxiliary import Pictures
+from app.model.handles import RecipeHandle, RecipePin
 from app.model.picture import Picture
 from app.model.recipe import FluidSettings, Recipe
 from app.model.strokes import FINEST_DETAIL, Change, Sample, Stroke
@@ -246,6 +247,23 @@ def test_the_cells_that_are_told_as_closed_are_those_that_are_wholly(device: Dev
     parts = replay.fluid.solid.get() / 255
     assert ((parts >= 0.5) & (parts < 1)).sum() > 10
     np.testing.assert_array_equal(replay.solid, parts == 1)
+    replay.release()
+
+
+def test_pins_are_led_before_handles_each_in_the_order_of_the_recipe(device: Device):
+    """By number, of which the tenth does not come before the second; and what is muted keeps its own."""
+    places = [(0.05 * number, 0.5) for number in range(1, 13)]
+    handles = tuple(RecipeHandle(at=at, to=at, muted=number == 4) for number, at in enumerate(places, 1))
+    recipe = Recipe(handle=handles, pin=tuple(RecipePin(at=at) for at in places[:3]), fluid=FluidSettings(grid=16))
+    replay = Replay(device, recipe, pictures(), budget=0)
+    told = [
+        *(f"pin[{number}]" for number in (1, 2, 3)),
+        *(f"handle[{number}]" for number in range(1, 13) if number != 4),
+    ]
+    assert [label for label, _ in replay.led] == told
+    np.testing.assert_allclose(
+        replay.handles.places / replay.grid.extent, [*places[:3], *places[:3], *places[4:]], atol=1e-6
+    )
     replay.release()
 
 
