@@ -24,6 +24,9 @@ PATIENCE = 90.0
 SLICE = 0.01  # seconds after which an editor that is held up is looked at
 SHADERS = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
 
+# The editor as `python -m app` starts it, but for what it does ahead and unseen: sixty ticks at each start.
+UNREHEARSED = "import runpy; from app.ui import rehearsal; rehearsal.PARTS = (); runpy.run_module('app', None, '__main__')"
+
 needs_a_screen = pytest.mark.skipif(
     sys.platform != "linux" or (not all(map(shutil.which, NEEDED)) and "CI" not in os.environ),
     reason=f"needs {' and '.join(NEEDED)}; tests/run installs them",
@@ -37,10 +40,15 @@ class Desk:
         folder: for the files of the screen, of the editor and of the test.
         size: of the screen, in pixels.
         threads: llvmpipe draws in threads of its own, as for most who use it; what that costs is told in conftest.py.
+        rehearses: the editor does ahead what a hand may do first; where nothing is said, if it has threads. That is
+            most of what a window costs here, where Mesa keeps what it has compiled.
     """
 
-    def __init__(self, folder: Path, size: tuple[int, int] = (1280, 800), threads: bool = False) -> None:
+    def __init__(
+        self, folder: Path, size: tuple[int, int] = (1280, 800), threads: bool = False, rehearses: bool | None = None
+    ) -> None:
         self.folder = folder
+        self._rehearses = threads if rehearses is None else rehearses
         # The server takes a display that nobody has, and tells its number once it listens.
         command = ["Xvfb", "-displayfd", "1", "-screen", "0", f"{size[0]}x{size[1]}x24", "-noreset", "-nolisten", "tcp"]
         command += ["-fbdir", str(folder)]
@@ -64,8 +72,9 @@ class Desk:
 
     def open(self, file: Path, *command: str) -> None:
         """Start the editor with a file, by `command` or else by the file alone, and wait until it is open."""
+        start = ("-m", "app") if self._rehearses else ("-c", UNREHEARSED)
         self.editor = subprocess.Popen(
-            [sys.executable, "-m", "app", *command, str(file)],
+            [sys.executable, *start, *command, str(file)],
             env=self.env,
             cwd=Path(__file__).parents[2],
             stdout=subprocess.PIPE,

@@ -31,12 +31,12 @@ pytestmark = needs_a_screen
 
 @pytest.fixture
 def desk(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Desk]:
-    desk = Desk(tmp_path, threads=getattr(request, "param", False))
+    desk = Desk(tmp_path, **getattr(request, "param", {}))
     yield desk
     desk.close()
 
 
-@pytest.mark.parametrize("desk", [True], indirect=True, ids=["threads"])
+@pytest.mark.parametrize("desk", [{"threads": True}], indirect=True, ids=["threads"])
 def test_a_whole_session(desk: Desk, tmp_path: Path, fluidwarp: Run) -> None:
     picture, work = tmp_path / "pattern.png", tmp_path / "work.fluidwarp"
     write_picture(picture, pattern())
@@ -75,6 +75,7 @@ def test_a_whole_session(desk: Desk, tmp_path: Path, fluidwarp: Run) -> None:
     assert np.array_equal(read_picture(exported).pixels, read_picture(rendered).pixels)
 
 
+@pytest.mark.parametrize("desk", [{"rehearses": True}], indirect=True, ids=["rehearsed"])
 def test_quick_strokes_on_a_fine_grid_all_act_in_full(desk: Desk, tmp_path: Path, fluidwarp: Run) -> None:
     """Four of them are drawn while the first is simulated, and exported while the last ones still wait."""
     work, exported, rendered = (tmp_path / name for name in ("work.fluidwarp", "work warped.png", "rendered.png"))
