@@ -197,6 +197,8 @@ def test_only_the_window_is_imported_by_name():
 def private(path: Path) -> Iterator[str]:
     """What a source file uses that is private to others: attributes, imports, and names that it hands to setattr."""
     for node in ast.walk(tree(path)):
+        if not isinstance(node, ast.Attribute | ast.ImportFrom | ast.Call):  # of most nodes, what comes now is slow
+            continue
         match node:
             case ast.Attribute(value=ast.Name("self" | "cls")):
                 names = []

@@ -297,16 +297,16 @@ def test_chart_beside_many_samples(device: Device, channels: int) -> None:
     star, plate = np.sin(36 * angle) > 0, 0.5 + 0.5 * np.cos(90 * np.pi * radius**2)
     checks, rings = (np.floor(x * 32) + np.floor(y * 32)) % 2, np.sin(40 * np.pi * radius) > 0
     value = np.where(y < 0, np.where(x < 0, star, plate), np.where(x < 0, checks, rings))
-    picture = np.repeat(np.round(255 * value).astype(np.uint8)[..., None], channels, axis=2)
+    grey = np.round(255 * value).astype(np.uint8)[..., None]
     turn, squeeze = 3 * np.exp(-((radius / 0.25) ** 2)), 1 + 1.5 * np.exp(-((radius / 0.3) ** 2))
     u, v = np.cos(turn) * x - np.sin(turn) * y, np.sin(turn) * x + np.cos(turn) * y
     warp = GivenMap(device, np.stack([squeeze * u - x, squeeze * v - y], axis=-1))
     # One place for each pixel of a result 24 times as wide and high: nothing of how many samples are chosen, and where.
-    light = srgb_to_linear(picture / 255.0).astype(np.float32)
+    light = srgb_to_linear(grey / 255.0).astype(np.float32)
     many = Sampler(device).apply(warp, light, (24 * n, 24 * n), Sampling(edges="clamp", samples=1))
-    mean = many.reshape(n, 24, n, 24, channels).mean(axis=(1, 3), dtype=np.float64)
-    wanted = 255 * np.clip(linear_to_srgb(mean), 0, 1)
-    found = Sampler(device).apply(warp, picture, how=Sampling(edges="clamp"))
+    mean = many.reshape(n, 24, n, 24, 1).mean(axis=(1, 3), dtype=np.float64)
+    wanted = 255 * np.clip(linear_to_srgb(mean), 0, 1)  # all channels are the same
+    found = Sampler(device).apply(warp, np.repeat(grey, channels, axis=2), how=Sampling(edges="clamp"))
     assert 10 * np.log10(255**2 / np.mean((found - wanted) ** 2)) > 42
 
 

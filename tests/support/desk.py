@@ -25,7 +25,9 @@ SLICE = 0.01  # seconds after which an editor that is held up is looked at
 SHADERS = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
 
 # The editor as `python -m app` starts it, but for what it does ahead and unseen: sixty ticks at each start.
-UNREHEARSED = "import runpy; from app.ui import rehearsal; rehearsal.PARTS = (); runpy.run_module('app', None, '__main__')"
+UNREHEARSED = (
+    "import runpy; from app.ui import rehearsal; rehearsal.PARTS = (); runpy.run_module('app', None, '__main__')"
+)
 
 needs_a_screen = pytest.mark.skipif(
     sys.platform != "linux" or (not all(map(shutil.which, NEEDED)) and "CI" not in os.environ),

@@ -148,7 +148,7 @@ def test_after_any_edits_the_window_shows_what_is_rendered(
     assert len(session.recipe.mask) == 2
     assert any(stroke.detail for stroke in session.recipe.stroke) == (seed != 2)
     masks = session.recipe.mask
-    for _ in range(12):
+    for _ in range(8):
         any_edit(session, dice)
         session.advance(1)  # not always as far as it has to go
     session.seek(session.end)

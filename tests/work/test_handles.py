@@ -466,8 +466,10 @@ def test_of_what_is_missed_one_remedy_is_told(
 ):
     """`objections` tell of what goes too far that it wants a larger radius; no fit is offered beside that."""
     one = led_to([0.3, 0.5], [0.3 + far * radius, 0.5], radius=radius, local=local)
-    replay = replay_of(device, handle=[one], pin=[{"at": [0.9, 0.9], "radius": 0.01}], duration=3.0)  # far off
-    replay.seek(180)
+    fluid = {"grid": 64, "viscosity": 0.03, "drag": 2.0, "dt": DT}
+    far_off = {"at": [0.9, 0.9], "radius": 0.01}
+    replay = replay_of(device, handle=[one], pin=[far_off], fluid=fluid, duration=3.0)
+    replay.seek(90)
     ((_, said, is_helped),) = unmet(replay, ARRIVED)
     assert (said.partition("should be: ")[2], is_helped) == (why, helped)
     assert bool([*objections(replay.recipe.handle, (), EXTENT)]) == why.startswith("its reach")
@@ -487,8 +489,8 @@ def test_of_what_is_missed_one_remedy_is_told(
 def test_only_what_is_near_is_in_the_way_of_what_has_let_go(device: Device, pin: dict[str, Any], halt: str):
     """A pin somewhere else was told as the reason, as soon as there was one."""
     one = led_to([0.3, 0.5], [0.324, 0.5], radius=0.03)
-    replay = replay_of(device, handle=[one], pin=[{"radius": 0.03} | pin], fluid={"grid": 32}, duration=3.0)
-    replay.seek(180)
+    replay = replay_of(device, handle=[one], pin=[{"radius": 0.03} | pin], fluid={"grid": 32, "dt": DT}, duration=3.0)
+    replay.seek(90)
     halts = dict(zip([label for label, _ in replay.led], replay.handles.halts, strict=True))
     assert halts["handle[1]"] == halt
     replay.release()

@@ -812,7 +812,7 @@ def test_whatever_is_done_while_strokes_wait_the_recipe_is_what_is_seen(
         lambda: session.go_to(dice.randrange(len(session.document.history.entries))),
         lambda: session.seek(dice.randrange(session.end + 1)),
     ]  # fmt: skip
-    for _ in range(40):
+    for _ in range(30):
         dice.choice(doings)()
         for _ in range(dice.randrange(6)):
             session.advance(dice.randrange(3))
