@@ -617,7 +617,7 @@ def test_the_lanes_lie_between_the_picture_and_the_timeline(
 def test_whatever_is_done_to_bars_with_pointer_and_keys_is_undone(painted: Robot) -> None:
     dice, session = random.Random(4), painted.editor.session
     begun = recipe(painted)
-    for _ in range(60):
+    for _ in range(40):
         drawn = lanes(painted).drawn
         what = dice.choice(["drag", "drag", "stretch", "click", "shift", "key", "key", "undo", "escape"])
         if what in ("drag", "stretch", "click", "shift") and drawn:

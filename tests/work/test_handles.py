@@ -452,24 +452,31 @@ def test_what_has_let_go_is_asked_for_nothing_unless_its_way_was_not_over(device
 
 
 @pytest.mark.parametrize(
-    ("radius", "far", "local", "why", "helped"),
+    ("radius", "far", "local", "dt", "why", "helped"),
     [
-        (0.1, 3.0, 0.0, "its reach (radius) is too small to go that far", False),
-        (0.03, 0.8, 0.0, "it reaches over only 1.9 cells of the simulation; give it a larger reach (radius)", False),
-        (0.03, 1.8, 1.0, "the picture around it cannot bend further", True),
-        (0.2, 1.9, 0.0, "the picture around it cannot bend further", True),
+        (0.1, 3.0, 0.0, DT, "its reach (radius) is too small to go that far", False),
+        (
+            0.03,
+            0.8,
+            0.0,
+            DT,
+            "it reaches over only 1.9 cells of the simulation; give it a larger reach (radius)",
+            False,
+        ),
+        (0.03, 1.8, 1.0, DT, "the picture around it cannot bend further", True),
+        (0.2, 1.9, 0.0, DT / 2, "the picture around it cannot bend further", True),
     ],
     ids=["too far", "small", "small and local", "neither"],
 )
 def test_of_what_is_missed_one_remedy_is_told(
-    device: Device, radius: float, far: float, local: float, why: str, helped: bool
+    device: Device, radius: float, far: float, local: float, dt: float, why: str, helped: bool
 ):
     """`objections` tell of what goes too far that it wants a larger radius; no fit is offered beside that."""
     one = led_to([0.3, 0.5], [0.3 + far * radius, 0.5], radius=radius, local=local)
-    fluid = {"grid": 64, "viscosity": 0.03, "drag": 2.0, "dt": DT}
+    fluid = {"grid": 64, "viscosity": 0.03, "drag": 2.0, "dt": dt}
     far_off = {"at": [0.9, 0.9], "radius": 0.01}
     replay = replay_of(device, handle=[one], pin=[far_off], fluid=fluid, duration=3.0)
-    replay.seek(90)
+    replay.seek(round(3.0 / dt))
     ((_, said, is_helped),) = unmet(replay, ARRIVED)
     assert (said.partition("should be: ")[2], is_helped) == (why, helped)
     assert bool([*objections(replay.recipe.handle, (), EXTENT)]) == why.startswith("its reach")
