@@ -36,7 +36,7 @@ def desk(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Desk]:
     desk.close()
 
 
-@pytest.mark.parametrize("desk", [{"threads": True}], indirect=True, ids=["threads"])
+@pytest.mark.parametrize("desk", [{"threads": True, "rehearses": False}], indirect=True, ids=["threads"])
 def test_a_whole_session(desk: Desk, tmp_path: Path, fluidwarp: Run) -> None:
     picture, work = tmp_path / "pattern.png", tmp_path / "work.fluidwarp"
     write_picture(picture, pattern())
