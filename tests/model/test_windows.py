@@ -320,7 +320,7 @@ def test_a_replay_in_windows_gives_the_same_bytes_by_any_path(device: Device):
     long = Stroke(
         tool="push", radius=0.03, detail=strokes[0].detail, samples=((14, 0.2, 0.3, 1.0), (20, 0.8, 0.7, 1.0))
     )
-    thick = a_stroke(rng, 20, "thicken", 0, count=7)  # from then on a tick takes several times as long
+    thick = a_stroke(rng, 27, "thicken", 0, count=5)  # from then on a tick takes several times as long
     whole = Stroke(tool="push", radius=0.15, samples=((29, 0.3, 0.5, 1.0), (32, 0.5, 0.5, 1.0)))
     recipe = painted(strokes[0], thick, strokes[1], long, strokes[2], whole, feel=HONEY, ticks=33)
     plain = replayed(device, recipe)

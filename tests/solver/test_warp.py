@@ -305,7 +305,7 @@ def test_rest_is_the_identity_exactly(device: Device) -> None:
     assert warp.statistics().det_min == warp.statistics().det_max == 1.0
 
 
-@pytest.mark.parametrize(("side", "moments"), [(700, (5, 9, 13, 21, 24)), (2560, (10, 18, 26))])
+@pytest.mark.parametrize(("side", "moments"), [(700, (5, 9, 13, 21, 24)), (2560, (10, 18))])
 def test_saved_state_goes_on_bit_for_bit(device: Device, side: int, moments: tuple[int, ...]) -> None:
     """From anywhere between two remaps, and where one is half done; also off the GPU, into another map."""
     grid = Grid(48, 48)

@@ -584,7 +584,7 @@ def test_works_opened_before_are_no_more_than_their_bounds(
 @pytest.mark.long
 def test_a_session_saved_and_rendered_is_the_same_picture(device: Device, robot: Robot, tmp_path: Path) -> None:
     dice = random.Random(1)
-    for _ in range(8):
+    for _ in range(6):
         robot.key(dice.choice(["p", "t", "b", "f", "v", "r"]))
         start = dice.uniform(0.2, 0.8), dice.uniform(0.2, 0.8)
         robot.drag(start, (start[0] + dice.uniform(-0.1, 0.1), start[1] + dice.uniform(-0.1, 0.1)), steps=3)

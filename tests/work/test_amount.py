@@ -197,7 +197,7 @@ def test_an_amount_that_is_none_is_refused() -> None:
 def test_what_is_frozen_keeps_every_bit_at_every_amount(device: Device) -> None:
     freeze = Stroke(tool="freeze", radius=0.12, hardness=1.0, samples=((0, 0.5, 0.35, 1.0), (1, 0.5, 0.35, 1.0)))
     twirl = TWIRL.model_copy(update={"samples": ((2, 0.5, 0.6, 1.0), (32, 0.5, 0.6, 1.0))})
-    recipe = TURNED.edited(stroke=(freeze, twirl))
+    recipe = TURNED.edited(stroke=(freeze, twirl), fluid=FluidSettings(grid=48, dt=1 / 30))
     replay, sampler = at_end(device, recipe), Sampler(device)
     y, x = np.mgrid[:80, :120] + 0.5
     inside = np.hypot(x / 120 - 0.5, y / 120 - 0.35 * 2 / 3) < 0.1
