@@ -876,13 +876,13 @@ from app.progress import on_terminal
 with on_terminal("stuck", 1), replacing("out.png") as temporary:
     temporary.write_bytes(b"half")
     print("writing", flush=True)
-    hashlib.pbkdf2_hmac("sha256", b"", b"", 2**30)
+    hashlib.pbkdf2_hmac("sha256", b"", b"", 2**25)
     print("all of it", flush=True)
 """
 
 
 def test_interrupted_where_nobody_asks(folder: Path):
-    """In the middle of a call into C that takes minutes."""
+    """In the middle of a call into C that takes many seconds: were it waited for, one would read so."""
     import signal
 
     before = here(folder)

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from app.errors import Cancelled
-from app.progress import Progress, interruptible, on_terminal
+from app.progress import GRACE, Progress, interruptible, on_terminal
 
 ROOT = Path(__file__).parents[1]
 
@@ -130,6 +130,17 @@ def test_a_second_ctrl_c_interrupts_at_once():
         assert cancel()
         with pytest.raises(KeyboardInterrupt):
             signal.raise_signal(signal.SIGINT)
+
+
+def test_where_nobody_answers_it_is_called_at_once_and_not_where_the_block_has_ended():
+    called = threading.Event()
+    with interruptible(called.set) as cancel:
+        signal.raise_signal(signal.SIGINT)
+        assert cancel()
+    assert not called.is_set()
+    with interruptible(called.set):
+        signal.raise_signal(signal.SIGINT)
+        assert called.wait(20 * GRACE)
 
 
 def test_other_threads_may_use_it():

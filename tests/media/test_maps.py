@@ -25,6 +25,7 @@ from app.media.displacement import (
     folds,
     from_offsets,
     from_st,
+    is_beside,
     to_offsets,
     to_st,
 )
@@ -535,3 +536,17 @@ def test_the_folds_of_a_large_map_are_counted_once() -> None:
     wanted = np.count_nonzero((1 + across_x) * (1 + down_y) <= across_y * down_x)
     assert 1000 < wanted < 0.5 * 700 * 1100
     assert folds(values) == wanted
+
+
+@pytest.mark.parametrize(("height", "width"), [(48, 64), (64, 48)])
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize("way", [-1, 1])
+def test_a_map_is_beside_the_picture_once_it_is_shifted_by_the_side_that_it_is_shifted_along(
+    height: int, width: int, axis: int, way: int
+) -> None:
+    """Also along the shorter side, by less than the longer one; a pixel less, and one row looks up what is there."""
+    side = (width, height)[axis]
+    for pixels, is_off in ((side, True), (side - 1, False)):
+        shift = np.zeros((height, width, 2), np.float32)
+        shift[..., axis] = way * pixels / 64
+        assert is_beside(shift) is is_off

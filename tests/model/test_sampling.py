@@ -192,6 +192,17 @@ def test_a_picture_beyond_2048_pixels_is_halved_to_the_nearest_code() -> None:
     assert SmallPictures(OnePicture(pixels[:, :2048])).load("source").width == 2048
 
 
+@pytest.mark.parametrize(("width", "side"), [(2050, 2), (4098, 3)])
+def test_a_picture_of_floats_beyond_2048_pixels_is_as_bright_when_it_is_made_smaller(width: int, side: int) -> None:
+    pixels = np.full((2 * side, width, 2), 0.375, np.float32)
+    pixels[:side, :side, 0] = np.arange(side**2).reshape(side, side)
+    small = SmallPictures(OnePicture(pixels)).load("source").pixels
+    assert (small.shape, small.dtype) == ((2, width // side, 2), np.float32)
+    assert small[0, 0, 0] == (side**2 - 1) / 2  # the mean of what is counted up
+    small[0, 0, 0] = 0.375
+    assert (small == 0.375).all()
+
+
 def test_the_pixel_at_a_place_is_the_one_that_holds_it() -> None:
     pixels = np.zeros((10, 20, 3))
     for place, wanted in (((0.0, 0.0), (0, 0)), ((0.099, 0.55), (5, 1)), ((0.1, 0.99), (9, 2)), ((1.0, 1.0), (9, 19))):

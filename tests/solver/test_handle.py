@@ -89,3 +89,21 @@ def test_a_line_of_which_one_point_is_in_the_picture_leads_that_to_its_own_place
     assert shape.wanted(shape.led, handle.last, DT) == pytest.approx(there)
     assert shape.due(shape.led, handle.last, DT) == pytest.approx(there)
     assert shape.short_of_edges(shape.led) == pytest.approx(0)
+
+
+@pytest.mark.parametrize("points", [(), ((0.45, 0.5), (0.55, 0.5))])
+@pytest.mark.parametrize(
+    ("to", "keys", "is_short"),
+    [
+        ((1.0, 0.5), (), True),
+        ((0.7, 0.5), ((2.0, 1.0, 0.5),), True),
+        ((1.0, 0.5), ((2.0, 0.7, 0.5),), False),
+        ((1.0, 0.5), ((2.0, 0.7, 0.5), (3.0, 0.5, 0.0)), True),
+    ],
+)
+def test_whether_it_stays_short_of_an_edge_is_asked_of_where_it_goes_last(
+    points: tuple, to: tuple[float, float], keys: tuple, is_short: bool
+) -> None:
+    shape = Shape.of(Handle((0.5, 0.5), to, duration=1.0, keys=keys, points=points), (1.0, 1.0), 0.02)
+    short = shape.short_of_edges(shape.led)
+    assert short > 0.01 if is_short else short == 0

@@ -570,7 +570,7 @@ def test_an_animation_ends_where_the_recording_does_that_goes_on_behind_the_dial
     robot: Robot, widgets: Widgets, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     session = robot.editor.session
-    session.change("Water", viscosity=0.0006)
+    session.change("Water", viscosity=0.00005)
     robot.drag((0.3, 0.5), (0.6, 0.5), steps=4)
     robot.key("ctrl+e")
     robot.frame(count=3)
@@ -588,6 +588,11 @@ def test_an_animation_ends_where_the_recording_does_that_goes_on_behind_the_dial
     assert dialog.job().recipe.time.end == pytest.approx(session.end * session.dt)
     widgets.type("To", "0.05")
     assert dialog.job().recipe.time.end == pytest.approx(0.05)
+    widgets.type("To", "99")  # at its very end it is the recording's again, and goes with it
+    before = session.end
+    robot.frame(count=10)
+    assert session.end > before
+    assert dialog.job().recipe.time.end == pytest.approx(session.end * session.dt)
 
 
 def test_print_notes_the_dots_per_inch_that_printers_ask_for(

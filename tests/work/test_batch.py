@@ -193,6 +193,17 @@ def test_names_that_cannot_be(
         spread(order("coffee", None, Outputs(Path(output))), [Path(name) for name in pictures])
 
 
+def test_a_folder_that_is_there_may_have_a_dot_in_its_name(tmp_path: Path):
+    """While one that is not there would be a file."""
+    task = order("coffee", None, Outputs(tmp_path / "shots.v2"))
+    pictures = [Path("in/a.png"), Path("in/b.png")]
+    with pytest.raises(UserError, match=r"2 pictures cannot all become .*shots\.v2"):
+        spread(task, pictures)
+    (tmp_path / "shots.v2").mkdir()
+    made = [one.outputs.file for one in spread(task, pictures)]
+    assert made == [tmp_path / "shots.v2" / name for name in ("a.png", "b.png")]
+
+
 def test_one_file_of_numbers_for_many_pictures_is_refused(tmp_path: Path):
     with pytest.raises(UserError, match=r"put \{name\} into its name"):
         spread(order("coffee", None, Outputs(tmp_path, stats=tmp_path / "s.json")), [Path("a.png"), Path("b.png")])

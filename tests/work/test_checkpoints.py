@@ -92,6 +92,16 @@ def test_they_are_dense_where_the_work_is_and_sparse_far_from_it(device: Device,
     assert all(later <= 1.5 * earlier + 1 for earlier, later in pairwise(gaps)), gaps
 
 
+def test_of_two_that_are_missed_as_little_one_goes(device: Device, field: Field) -> None:
+    """Those on both sides of the newest are as far from it, with gaps as long."""
+    kept = Checkpoints(4 * field.nbytes)
+    for tick in (0, 1, 3, 4, 2):
+        kept.add(at(device, field, tick))
+    assert len(kept) == 4
+    assert {0, 2, 4} < set(ticks(kept)) < set(range(5))
+    kept.clear()
+
+
 def test_the_nearest_is_the_last_one_before_that_is_on_the_way(device: Device, field: Field) -> None:
     kept = Checkpoints()
     own, others = (2, 4, 8, 12), (7, 10)
