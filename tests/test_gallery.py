@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,12 +15,13 @@ from app.errors import UserError
 from app.gallery.drawing import FORCE, INK, MARGIN, PANEL, WIDE, arrows, at_work, contact_sheet, marked, shades
 from app.gallery.figures import BESIDES, FIGURES, figure_1, make
 from app.gallery.measures import light, sharpness, spline_of, spline_warp, stretch_and_det
-from app.gallery.studio import Studio, load, recipes_folder, source_of
+from app.gallery.studio import Played, Studio, load, recipes_folder, source_of
 from app.media.auxiliary import Pictures
 from app.media.landmarks import read_pairs
 from app.media.outlines import read_outlines
 from app.media.pictures import read_picture
 from app.model.picture import Picture
+from app.model.recipe import Recipe
 from app.progress import Progress
 from app.work.replay import Replay
 from solver.gl.device import Device
@@ -121,6 +124,54 @@ def test_coordinates_stay_sharp_and_values_blur(studio: Studio) -> None:
     numbers = figure_1(studio)
     assert float(numbers["sharpness, coordinates"].rstrip("%")) >= 95
     assert float(numbers["sharpness, density"].rstrip("%")) < 60
+
+
+BRIEF = 0.5, 1 / 16  # seconds and a step of them: in the middle of Figure 3, and two frames of handles at work
+ALONE = {  # what a page of the guide shows by itself
+    "guide-forces": lambda recipe: recipe.force,
+    "guide-viscosity": lambda recipe: (*recipe.viscosity, *recipe.freeze),
+}
+
+
+class BriefStudio(Studio):
+    """Plays half a second of each recipe on a coarse grid, and notes which those were and what is on the sheets."""
+
+    def __init__(self, device: Device, folder: Path) -> None:
+        super().__init__(device, folder, Progress())
+        self.names: set[str] = set()
+        self.sheets: dict[str, list[tuple[str, np.ndarray]]] = {}
+
+    def play(self, name: str, *how: Any, **parts: Any) -> Played:
+        return super().play(name, *how, **self._brief(load(name)), **parts)
+
+    def still(self, recipe: Recipe) -> np.ndarray:
+        return super().still(recipe.edited(**self._brief(recipe)))
+
+    def _brief(self, recipe: Recipe) -> dict[str, object]:
+        self.names.add(recipe.name)
+        return {"duration": BRIEF[0], "fluid": recipe.fluid.model_copy(update={"grid": 32, "dt": BRIEF[1]})}
+
+    def sheet(self, name: str, title: str, panels: list[tuple[str, np.ndarray]], height: int = PANEL) -> None:
+        self.sheets[name] = panels
+        super().sheet(name, title, panels, height)
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_a_figure_shows_the_recipe_of_its_name(name: str, device: Device, tmp_path: Path) -> None:
+    """On one sheet; a page of the guide each force, or each layer, by itself and by its name."""
+    studio, recipe = BriefStudio(device, tmp_path), load(name)
+    try:
+        FIGURES[name](studio)
+    finally:
+        studio.release()
+    assert studio.names == {load(each).name for each in (name, *BESIDES) if each.startswith(name)}
+    ((sheet, panels),) = studio.sheets.items()
+    assert sheet == name
+    if name in ALONE:
+        assert [words for words, _ in panels] == ["the picture", *(part.name for part in ALONE[name](recipe))]
+        assert len({pixels.tobytes() for _, pixels in panels}) == len(panels)
+    if not name.startswith("handles"):  # of which they are drawn on it
+        assert np.array_equal(panels[0][1], source_of(recipe))
 
 
 def test_a_folder_that_cannot_be_made_is_told(device: Device, tmp_path: Path) -> None:

@@ -42,7 +42,7 @@ from app.ui.files import fresh_recipe, load_any
 from app.ui.key_sheet import KeySheet
 from app.ui.numbers import Numbers
 from app.ui.preferences import Preferences
-from app.ui.quality import GRIDS, PATIENCE, TRIALS, Speed
+from app.ui.quality import GRIDS, PATIENCE, TICKS, TRIALS, Speed
 from app.ui.saving import SaveDialog
 from app.ui.widgets import Ui
 from app.work.export import run
@@ -1633,6 +1633,21 @@ def test_what_is_measured_has_none_of_the_forces_of_the_work(automatic: Robot) -
     assert quality.speed is not None
     assert not [message for message in automatic.editor.messages.shown if "throws the fluid" in message.text]
     assert session.recipe.force == (force,)
+
+
+def test_the_machine_is_measured_only_once_nothing_plays_any_more(automatic: Robot) -> None:
+    """Which would be measured along: more frames play than measuring takes."""
+    session, quality = automatic.editor.session, automatic.editor.quality
+    force = VortexForce(kind="vortex", point=(0.5, 0.5), radius=0.2, strength=0.1)
+    session.edit("A force", force=(force,), duration=120 * session.dt)
+    session.seek(0)
+    session.play()
+    for _ in range(4 * TICKS):
+        automatic.frame()
+        assert session.playing
+        assert quality.is_measuring
+    session.seek(session.tick)
+    automatic.until(lambda: not quality.is_measuring)
 
 
 def test_a_recipe_with_a_force_that_no_map_can_follow_is_told_of_while_the_machine_is_measured(

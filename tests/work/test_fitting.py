@@ -297,6 +297,15 @@ def test_without_pairs_the_recipe_s_own_handles_are_fitted_and_all_keep_their_nu
         fit(device, None)
 
 
+def test_what_is_not_fitted_keeps_its_windows(device: Device):
+    """Of whatever detail, and none; what is fitted gets them."""
+    other = "[[handle]]\nat = [0.8, {}]\nto = [0.82, {}]\nradius = 0.1\nduration = 0.2\n"
+    recipe = f"{FREE}{other.format(0.6, 0.6)}detail = 96\n{other.format(0.3, 0.3)}"
+    first, second, *led = fit(device, PAIRS, 1, recipe).trial.recipe.handle
+    assert [first, second] == list(Recipe.parse(recipe).handle)
+    assert all(handle.detail for handle in led)
+
+
 @pytest.mark.parametrize("local", [None, 0.0, 0.25])
 def test_what_is_fitted_is_as_local_as_is_asked_for_and_else_as_it_is_or_has_to_be(device: Device, local: float | None):
     """What is not fitted, as it is muted or goes nowhere, stays as it is."""
