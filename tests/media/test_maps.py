@@ -541,9 +541,7 @@ def test_the_folds_of_a_large_map_are_counted_once() -> None:
 @pytest.mark.parametrize(("height", "width"), [(48, 64), (64, 48)])
 @pytest.mark.parametrize("axis", [0, 1])
 @pytest.mark.parametrize("way", [-1, 1])
-def test_a_map_is_beside_the_picture_once_it_is_shifted_by_the_side_that_it_is_shifted_along(
-    height: int, width: int, axis: int, way: int
-) -> None:
+def test_a_map_is_beside_the_picture_once_it_is_shifted_off_it(height: int, width: int, axis: int, way: int) -> None:
     """Also along the shorter side, by less than the longer one; a pixel less, and one row looks up what is there."""
     side = (width, height)[axis]
     for pixels, is_off in ((side, True), (side - 1, False)):

@@ -193,7 +193,7 @@ def test_a_picture_beyond_2048_pixels_is_halved_to_the_nearest_code() -> None:
 
 
 @pytest.mark.parametrize(("width", "side"), [(2050, 2), (4098, 3)])
-def test_a_picture_of_floats_beyond_2048_pixels_is_as_bright_when_it_is_made_smaller(width: int, side: int) -> None:
+def test_floats_beyond_2048_pixels_stay_as_bright_when_they_are_made_smaller(width: int, side: int) -> None:
     pixels = np.full((2 * side, width, 2), 0.375, np.float32)
     pixels[:side, :side, 0] = np.arange(side**2).reshape(side, side)
     small = SmallPictures(OnePicture(pixels)).load("source").pixels

@@ -473,9 +473,7 @@ def test_what_cannot_be_met_is_told_as_the_command_line_tells_it_until_it_is_men
     assert not robot.editor.messages.shown
 
 
-def test_what_is_unmet_is_told_also_where_a_handle_of_its_number_was_in_the_work_before(
-    robot: Robot, tmp_path: Path
-) -> None:
+def test_what_is_unmet_is_told_also_where_it_was_in_the_work_before(robot: Robot, tmp_path: Path) -> None:
     for x in (0.6, 0.55):
         led = Recipe.model_validate({"handle": ({"at": (0.4, 0.5), "to": (x, 0.5), "duration": 0.05},)})
         recipe = robot.editor.session.project.recipe.edited(handle=led.handle, duration=0.1)
