@@ -330,7 +330,8 @@ class ExportDialog(Dialog):
             if seconds > 0:
                 self.start = ui.slider("from", "From", self.start, 0, seconds, SECONDS, 0.0).value
                 slid = ui.slider("to", "To", self.end, 0, seconds, SECONDS, seconds)
-                self._end = (slid.value if slid.value < seconds else None) if slid.changed else self._end
+                if slid.changed:  # to what is shown: a slid end has fewer digits than the recording's
+                    self._end = slid.value if SECONDS.text(slid.value) != SECONDS.text(seconds) else None
             if clip is None:
                 choices.returns = ui.check("Ping-pong", choices.returns)
                 ui.tooltip("Ping-pong", more="There and back again: a loop without a jump.")

@@ -596,6 +596,22 @@ def test_an_animation_ends_where_the_recording_does_that_goes_on_behind_the_dial
     assert dialog.job().recipe.time.end == pytest.approx(session.end * session.dt)
 
 
+def test_an_animation_that_is_shown_to_end_where_the_recording_does_ends_there(
+    robot: Robot, dialog: ExportDialog, widgets: Widgets
+) -> None:
+    """Of whose 0.9333 seconds, say, two digits are shown, and are slid to."""
+    session = robot.editor.session
+    while session.end * session.dt < round(session.end * session.dt, 2) + 0.001:
+        session.step()
+    widgets.click("Animation")
+    for typed in (f"{session.end * session.dt:.2f}", "99"):
+        widgets.type("To", "0.05")
+        assert dialog.job().recipe.time.end == pytest.approx(0.05)
+        widgets.type("To", typed)
+        session.step()  # as it goes on
+        assert dialog.job().recipe.time.end == pytest.approx(session.end * session.dt)
+
+
 def test_print_notes_the_dots_per_inch_that_printers_ask_for(
     robot: Robot, dialog: ExportDialog, widgets: Widgets
 ) -> None:
