@@ -66,9 +66,14 @@ class Editing(Painting):
         if not (base.stroke or base.change or (base.mask and self.end)) and self.target == 0 and lasts:
             self._use_edited(base.edited(fluid=base.fluid.model_copy(update=settings)))
             return
-        fluid = base.fluid_at(self._next)
+        saved, tick = self.document.recipe, self._next
+        fluid = saved.fluid_at(tick)
         if lasts and fluid.model_copy(update=settings) == fluid:  # what is set to what it is already is no edit
-            self._use_edited(base)
+            self._use_edited(saved)
+            if base != saved:  # a slider that is dragged back gives back what it had cut off
+                self._base, self.notice = saved, None
+                self.retracted += 1
+                self._go_back(tick)
             return
         tick = self._go_on()
         self.playing = self.coasting = False

@@ -65,7 +65,7 @@ class Recording:
         coasting: time goes on because the fluid still moves.
         is_rebuilding: all is made again on another grid; what is seen in between is of no interest.
         notice: something the person should hear of, for the window to take.
-        retracted: how many edits were taken back as if they had never been.
+        retracted: how many edits, or previews of one, were taken back as if they had never been.
         changes: grows with everything that changes what is seen.
         clip_frames: how many the clip has, as far as is known.
     """

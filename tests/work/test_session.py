@@ -355,6 +355,18 @@ def test_what_is_set_to_what_it_is_already_is_no_edit(session: Session) -> None:
         session.preview_change(drag=drag)
     session.commit("Drag")
     assert (session.recipe, session.document.history.entries) == (recipe, entries)
+    for tick in (2, changed, changed + 2):
+        session.seek(tick)
+        session.settle()
+        for drag in (3.0, 4.0, session.recipe.fluid_at(tick).drag):
+            session.preview_change(drag=drag)
+        session.commit("Drag")
+        session.settle()
+        assert (session.recipe, session.document.history.entries) == (recipe, entries), "it is dragged there and back"
+        assert (session.tick, session.notice) == (tick, None)
+        session.change("Drag", drag=3.0)
+        assert session.end == tick, "and the playhead is where work goes on"
+        session.retract()
     session.seek(changed)
     session.settle()
     session.play()
