@@ -436,10 +436,13 @@ def _perform_many(tasks: Sequence[Piece], jobs: int, cluster: str | None, verbos
     written, repeated = 0, Counter[str]()
     failed: list[Outcome] = []
 
+    files = {task.label: [path.name for path in task.outputs.files] for task in tasks}
+
     def new(label: str, *notices: str) -> list[str]:
         # Without the picture's name, which is taken out of names of files alone: that of 8.png is in many a number.
-        own = re.compile(rf"(?<![^\W_]){re.escape(Path(label).stem)}(?![^\W_])(?=\S*\.[A-Za-z])")
-        alike = {said: own.sub(NAME, said) for said in notices}
+        stem, names = Path(label).stem, map(re.escape, files.get(label, ()))
+        own = "|".join((*names, rf"{re.escape(stem)}(?![^\W_])(?=\S*\.[A-Za-z])"))
+        alike = {said: re.sub(rf"(?<![^\W_])(?:{own})", lambda it: it[0].replace(stem, NAME), said) for said in notices}
         found = [said for said in notices if verbose or alike[said] not in repeated]
         repeated.update(alike.values())
         return found

@@ -844,7 +844,7 @@ def test_what_belongs_to_an_animated_picture_is_kept_or_told(tmp_path: Path, flu
             assert thing.kept(seen(tmp_path / output)) != bool(re.search(thing.told, ran.stderr)), (key, ran.stderr)
 
 
-@pytest.mark.parametrize("output", ["{name}.exr", "to_{name}_2.exr"])
+@pytest.mark.parametrize("output", ["{name}.exr", "to_{name}_2.exr", "{name} warped.exr", "w{name}w.exr"])
 def test_what_many_pictures_lose_alike_is_told_of_the_first(tmp_path: Path, fluidwarp: Run, output: str) -> None:
     (tmp_path / "still.toml").write_text(RECIPE)
     (tmp_path / "out").mkdir()
