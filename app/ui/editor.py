@@ -407,7 +407,8 @@ class Editor:
         ui, layout, workspace, state, likes = self.ui, self.layout, self.workspace, self.state, self.preferences
         marks.draw(ui, self.view, self.session, state, self.pointer, self.selecting.outline)
         busy = self.exports.is_running or self.fits.is_running or self.files.is_loading
-        hud.draw(ui, workspace, state, self.selecting, likes, self.numbers, self.clock, self.do, busy)
+        back = self.pointer.is_opposite
+        hud.draw(ui, workspace, state, self.selecting, likes, self.numbers, self.clock, self.do, busy, back)
         strip.draw(ui, layout, state)
         if layout.inspector is not None:
             inspector.draw(ui, layout.inspector, workspace, state, self.selecting, self.quality, self.clock, self.do)

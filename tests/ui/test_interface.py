@@ -405,6 +405,14 @@ def test_a_hint_is_of_the_tool_in_hand(robot: Robot, monkeypatch: pytest.MonkeyP
         own = selecting if tool.name == "select" else f"{(is_opposite and tool.back) or tool.hint}."
         is_there = tool.name == "select" or (tool.gesture is not None and tool.name not in shows_legend)
         assert known & {*said} == ({own} if is_there else set()), tool.name
+    robot.editor.state.choose_tool("bloat", False)
+    for is_held, hint in ((True, TOOL["bloat"].back), (False, TOOL["bloat"].hint)):  # Alt, which is the other direction
+        robot.mods = Mods(alt=is_held)
+        robot.move(*robot.at(0.5, 0.5))
+        robot.frame()
+        said.clear()
+        robot.frame()
+        assert known & {*said} == {f"{hint}."}
     robot.editor.state.choose_tool("handle", False)
     robot.size = (560, 500)
     robot.frame(count=2)

@@ -37,8 +37,14 @@ def draw(
     clock: Clock,
     do: Do,
     is_covered: bool,
+    is_opposite: bool,
 ) -> None:
-    """Everything that floats over the canvas; `is_covered`: what is under way is told where hints stand."""
+    """Everything that floats over the canvas.
+
+    Args:
+        is_covered: what is under way is told where hints stand.
+        is_opposite: the tool in hand works in its other direction.
+    """
     session, canvas = workspace.session, workspace.view.canvas
     if canvas.width > ui.px(ZOOM) and not (is_covered and canvas.height <= ui.px(LOW)):
         _zoom(ui, workspace, do)
@@ -52,7 +58,7 @@ def draw(
     if how and not is_covered and has_room:
         _how(ui, canvas, how)
     elif preferences.hint and state.tool.gesture and not how and has_room and not has_legend and not state.statistics:
-        _hint(ui, canvas, (state.is_opposite and state.tool.back) or state.tool.hint, preferences)
+        _hint(ui, canvas, (is_opposite and state.tool.back) or state.tool.hint, preferences)
     if has_legend:
         _legend(ui, canvas, state.overlays["viscosity"].opacity)
     if state.statistics:
