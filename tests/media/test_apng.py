@@ -545,6 +545,19 @@ def test_a_png_of_which_the_frames_are_none_is_opened_as_a_still(tmp_path: Path)
         assert (source.clip, source.picture.note, source.picture.pixels[0, 0].tolist()) == (None, "", [0, 90, 0])
 
 
+def test_a_png_that_tells_of_its_frames_again_behind_its_picture_has_those_that_it_told_of_first(tmp_path: Path):
+    still, *others = [Image.new("RGB", (WIDTH, HEIGHT), (40 * number, 90, 0)) for number in range(3)]
+    still.save(path := tmp_path / "a.png", save_all=True, append_images=others)
+    data = path.read_bytes()
+    at = data.index(b"fdAT")
+    at = data.rindex(b"fcTL", 0, at) - 4
+    for told in (2, 9):
+        path.write_bytes(data[:at] + chunk(b"acTL", struct.pack(">II", told, 0)) + data[at:])
+        clip = open_source(path).clip
+        assert clip is not None
+        assert clip.frames == 3
+
+
 @pytest.mark.parametrize(("count", "told"), [(3, "of its 3 frames none"), (1, "of its 1 frame none")])
 def test_the_still_before_an_apng_is_none_of_its_frames(tmp_path: Path, count: int, told: str):
     still, *others = [Image.new("RGB", (WIDTH, HEIGHT), (40 * number, 90, 0)) for number in range(count + 1)]

@@ -26,7 +26,7 @@ def read(data: bytes) -> Animation | None:
         match kind:
             case b"IHDR":
                 head = body
-            case b"acTL":
+            case b"acTL" if not told[0]:  # a second one tells nothing
                 told = struct.unpack_from(">II", body)
             case b"fcTL":
                 if control is not None:
