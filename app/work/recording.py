@@ -315,6 +315,7 @@ class Recording:
             return
         tick = self.target
         if not recipe.is_set_up_as(before):
+            replay.grid_of(recipe)  # before anything is changed, as that may be refused
             self.is_rebuilding = tick > 0
             replay.seek(0)
         else:

@@ -168,6 +168,14 @@ class Replay:
                 self.handles.replace(self._handles())
             self._edit_masks(before)
 
+    def grid_of(self, recipe: Recipe) -> Grid:
+        """The grid that a recipe is simulated on. Raises `UserError` if the device cannot hold it."""
+        grid = Grid.for_picture(self.pictures.source.width, self.pictures.source.height, recipe.fluid.grid)
+        if max(differences_of(grid.size)) > self.device.limits.max_texture_size:
+            cells = f"a grid of {grid.nx} x {grid.ny} cells is more than this graphics device can hold"
+            raise UserError(f"{cells}; use a smaller --grid or 'fluid.grid'", in_window=f"{cells}; choose fewer")
+        return grid
+
     def check_forces(self, recipe: Recipe) -> None:
         """Raise `UserError` if the forces of a recipe cannot be made here, and are not those at work."""
         if recipe.force != self.recipe.force:
@@ -438,11 +446,7 @@ class Replay:
     def _build(self) -> None:
         """Everything as it is at tick 0."""
         recipe, source = self.recipe, self.pictures.source
-        self.grid = Grid.for_picture(source.width, source.height, recipe.fluid.grid)
-        largest = self.device.limits.max_texture_size
-        if max(differences_of(self.grid.size)) > largest:
-            cells = f"a grid of {self.grid.nx} x {self.grid.ny} cells is more than this graphics device can hold"
-            raise UserError(f"{cells}; use a smaller --grid or 'fluid.grid'", in_window=f"{cells}; choose fewer")
+        self.grid, largest = self.grid_of(recipe), self.device.limits.max_texture_size
         fluid, warp = SOLVERS[recipe.fluid.solver]
         self.window: FlowWindow | None = None
         self._has_windows = may_have_windows(recipe)

@@ -374,6 +374,23 @@ def test_what_is_set_to_what_it_is_already_is_no_edit(session: Session) -> None:
     assert (session.playing, session.coasting, session.recipe) == (True, False, recipe)
 
 
+def test_a_grid_that_is_refused_leaves_the_work_as_it_is(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It was half on that grid, at the beginning, with nothing left to be simulated."""
+    paint(session, "push", (0.3, 0.5), (0.5, 0.5))
+    session.settle()
+    recipe, tick, seen = session.recipe, session.tick, session.replay.warp.read()
+    device = session.device
+    monkeypatch.setattr(device, "limits", replace(device.limits, max_texture_size=256))
+    with pytest.raises(UserError, match="cells is more than this graphics device can hold"):
+        session.set_grid(400)
+    assert (session.recipe, session.document.recipe, session.tick, session.is_behind) == (recipe, recipe, tick, False)
+    assert np.array_equal(session.replay.warp.read(), seen)
+    session.undo()
+    session.redo()
+    session.settle()
+    assert np.array_equal(session.replay.warp.read(), seen)
+
+
 def test_settings_before_the_first_stroke_are_the_recipe_s_own(session: Session) -> None:
     session.change("Water", viscosity=0.0006, drag=0.5)
     assert session.recipe.change == ()
