@@ -170,10 +170,11 @@ class Replay:
 
     def grid_of(self, recipe: Recipe) -> Grid:
         """The grid that a recipe is simulated on. Raises `UserError` if the device cannot hold it."""
-        grid = Grid.for_picture(self.pictures.source.width, self.pictures.source.height, recipe.fluid.grid)
+        source = self.pictures.source
+        grid = Grid.for_picture(source.width, source.height, recipe.fluid.grid)
         if max(differences_of(grid.size)) > self.device.limits.max_texture_size:
-            cells = f"a grid of {grid.nx} x {grid.ny} cells is more than this graphics device can hold"
-            raise UserError(f"{cells}; use a smaller --grid or 'fluid.grid'", in_window=f"{cells}; choose fewer")
+            large = f"grid of {grid.nx} x {grid.ny} cells is more than this graphics device can hold"
+            raise UserError(f"a {large}; use a smaller --grid or 'fluid.grid'", in_window=f"A {large}; choose fewer.")
         return grid
 
     def check_forces(self, recipe: Recipe) -> None:

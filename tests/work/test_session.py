@@ -381,8 +381,9 @@ def test_a_grid_that_is_refused_leaves_the_work_as_it_is(session: Session, monke
     recipe, tick, seen = session.recipe, session.tick, session.replay.warp.read()
     device = session.device
     monkeypatch.setattr(device, "limits", replace(device.limits, max_texture_size=256))
-    with pytest.raises(UserError, match="cells is more than this graphics device can hold"):
+    with pytest.raises(UserError, match="cells is more than this graphics device can hold") as refused:
         session.set_grid(400)
+    assert refused.value.in_window.startswith("A grid of 400 x ")
     assert (session.recipe, session.document.recipe, session.tick, session.is_behind) == (recipe, recipe, tick, False)
     assert np.array_equal(session.replay.warp.read(), seen)
     session.undo()
