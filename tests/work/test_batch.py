@@ -425,7 +425,7 @@ def workers(of: int) -> list[int]:
     """The processes that any thread of a process has started to work in."""
     found = []
     for children in Path(f"/proc/{of}/task").glob("*/children"):
-        with suppress(FileNotFoundError):  # it has ended since
+        with suppress(FileNotFoundError, ProcessLookupError):  # it has ended since, before it is opened or after
             for pid in children.read_text().split():
                 if b"serve()" in Path(f"/proc/{pid}/cmdline").read_bytes():
                     found.append(int(pid))
