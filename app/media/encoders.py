@@ -51,11 +51,6 @@ class Stream:
     colours: Colours = USUAL
 
     @property
-    def is_shallow(self) -> bool:
-        """Of a high dynamic range in 8 bits; a codec that keeps the depth writes too few bits for that."""
-        return self.colours.is_high and self.bits == 8
-
-    @property
     def on_black(self) -> str:
         """The filters for a codec without alpha."""
         # In 8 bits, as ffmpeg 9 makes white black where it multiplies 16.
@@ -238,6 +233,10 @@ ANIMATIONS = {
 }
 
 
+# The videos that tell what their colours are, with the codecs that have enough bits for a high dynamic range.
+TELLING = {".mov": None, ".mkv": None, ".mp4": "h265", ".webm": "av1"}
+
+
 def is_animation(path: str | os.PathLike[str]) -> bool:
     """Whether the name alone asks for more than one frame; `.webp` does not, it may be a still."""
     suffix = Path(path).suffix.lower()
@@ -386,14 +385,27 @@ def _check_told(
 
     stream: what of them a video would be made of; None if none can tell them.
     """
-    others = "" if stream is None or stream.is_shallow else ", .mkv, .mp4 with --codec h265, .webm with --codec av1,"
-    videos = f".mov{others} or " if stream is not None else ""
-    mend = "write .png" if is_still else f"write {videos}name.%04d.png"
-    if stream is None or container is None or Path(path).suffix.lower() not in (".mp4", ".webm", ".mkv", ".mov"):
+    kinds = [kind for kind in TELLING.items() if _is_offered(stream, *kind)] if stream is not None else []
+    videos = ", ".join(f"{ending} with --codec {codec}" if codec else ending for ending, codec in kinds)
+    before_last = ", or " if len(kinds) > 1 else " or "
+    mend = "write .png" if is_still else f"write {before_last.join(filter(None, (videos, 'name.%04d.png')))}"
+    if stream is None or container is None or Path(path).suffix.lower() not in TELLING:
         raise UserError(f"Cannot write {path}: it cannot tell that {what}; {mend}.")
-    options = container.encoding(codec)(stream)
-    if stream.colours.is_high and depth_of(options[options.index("-pix_fmt") + 1])[0] < 10:
+    if not _has_bits(container.encoding(codec), stream):
         raise UserError(f"Cannot write {path}: {what}, and 8 bits are too few; {mend}.")
+
+
+def _is_offered(stream: Stream, ending: str, codec: str | None) -> bool:
+    """Whether frames can be written so, and by this ffmpeg."""
+    try:
+        return _has_bits(ANIMATIONS[ending].encoding(codec), stream)
+    except UserError:  # an encoder that is not there
+        return False
+
+
+def _has_bits(encoding: Encoding, stream: Stream) -> bool:
+    options = encoding(stream)
+    return not stream.colours.is_high or depth_of(options[options.index("-pix_fmt") + 1])[0] >= 10
 
 
 def depth_of(pixel_format: str) -> tuple[int, str]:

@@ -15,6 +15,7 @@ import pytest
 from PIL import ImageCms
 
 from app.errors import UserError
+from app.media import ffmpeg
 from app.media.clip import USUAL, FileClip, uncoded
 from app.media.encoders import (
     ANIMATIONS,
@@ -117,6 +118,26 @@ NAMES = [
     for ending in endings
     for codec in (None, *(ANIMATIONS[ending].codecs if not number and animated else ()))
 ]
+
+
+@pytest.mark.parametrize(
+    ("has", "offered"),
+    [
+        ("libx264 libx265 libaom-av1", ".mov, .mkv, .mp4 with --codec h265, .webm with --codec av1, or name"),
+        ("libx264 libx265", ".mov, .mkv, .mp4 with --codec h265, or name"),
+        ("libx264", ".mov, .mkv, or name"),
+    ],
+)
+def test_what_is_advised_is_what_this_ffmpeg_can_encode(
+    monkeypatch: pytest.MonkeyPatch, has: str, offered: str
+) -> None:
+    """It was H.265 and AV1 whatever encoders there are."""
+    monkeypatch.setattr(ffmpeg, "encoders", lambda: frozenset(has.split()))
+    picture = Picture(np.zeros((4, 4, 3), np.uint16), chunks={b"cICP": bytes([9, 16, 0, 1])})
+    for name in ("a.gif", "a.mp4"):
+        with pytest.raises(UserError) as raised:
+            check_colours_of_picture(name, None, picture, animated=True)
+        assert str(raised.value).partition("; write ")[2] == f"{offered}.%04d.png."
 
 
 @pytest.mark.parametrize("named", TOLD)
