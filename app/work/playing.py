@@ -194,9 +194,12 @@ class Playing(Editing):
             self._live = self._live.edited(**longer)
             self._is_heard = False
             if self.made is None:
-                # What is previewed is no part of what was done before it: it becomes an entry of its own.
+                # What is previewed is no part of what was done before it: it becomes an entry of its own, and what it
+                # has cut off stays in the one before.
+                is_whole = self._base == self.document.recipe
                 self._base = self._base.edited(**longer) if is_previewed else self._live
-                self.document.history.go_on(self._base)
+                if is_whole:
+                    self.document.history.go_on(self._base)
         self._step()
 
     def _look_for_rest(self) -> None:

@@ -914,6 +914,29 @@ def test_what_was_previewed_and_dropped_sends_the_playhead_nowhere_later(session
     assert (session.target, session.recipe.amount) == (end, 1.0)
 
 
+@pytest.mark.parametrize("goes_on", ["play", "step"])
+def test_time_that_goes_on_while_a_setting_is_dragged_takes_nothing_from_the_work(
+    session: Session, goes_on: str
+) -> None:
+    """What is cut off while the slider is held was cut out of the entry before it, where no Undo brought it back."""
+    paint(session, "push", (0.3, 0.5), (0.6, 0.5), ticks=8)
+    session.settle()
+    entries = session.document.history.entries
+    session.seek(5)
+    session.settle()
+    session.preview_change(drag=1.0)
+    session.settle()
+    getattr(session, goes_on)()
+    session.advance(1)
+    assert session.end > 5, "time goes on"
+    assert session.document.history.entries == entries
+    session.commit("Drag")
+    assert session.document.history.entries[:-1] == entries
+    assert session.recipe.fluid_at(5).drag == 1.0
+    session.undo()
+    assert session.recipe == entries[-1].recipe
+
+
 def test_nothing_moves_while_what_changes_the_fluid_from_here_on_is_dragged(session: Session) -> None:
     paint(session, "push", (0.4, 0.5), (0.6, 0.5))
     session.advance(1)
