@@ -66,7 +66,7 @@ class Editing(Painting):
         if not (base.stroke or base.change or (base.mask and self.end)) and self.target == 0 and lasts:
             self._use_edited(base.edited(fluid=base.fluid.model_copy(update=settings)))
             return
-        saved, tick = self.document.recipe, self._next
+        saved, tick = self.document.recipe, self.next_tick
         fluid = saved.fluid_at(tick)
         if lasts and fluid.model_copy(update=settings) == fluid:  # what is set to what it is already is no edit
             self._use_edited(saved)

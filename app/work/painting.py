@@ -189,4 +189,4 @@ class Painting(Recording):
 
     def _can_take(self, led: RecipeHandle | RecipePin) -> bool:
         """True if it is still there, and has begun where what is done next begins."""
-        return led in (*self._live.handle, *self._live.pin) and led.first_tick(self.dt) < self._next
+        return led in (*self._live.handle, *self._live.pin) and led.first_tick(self.dt) < self.next_tick

@@ -280,13 +280,18 @@ class Recording:
             self._approach(time.perf_counter() + 60)
 
     @property
-    def _next(self) -> int:
-        """The tick at which the next thing begins: behind all that is recorded, or where the playhead was sent to."""
-        return self.target if self._went_back else self.end + self._beyond
+    def next_tick(self) -> int:
+        """The tick at which the next thing begins: behind all that is recorded, or where the playhead was sent to.
+
+        A setting that is dragged goes on to change where it did at first: at tick 0 that is before the recording's end.
+        """
+        if self._went_back:
+            return self.target
+        return self.end + self._beyond if self._changes_at is None else self._changes_at
 
     def _go_on(self) -> int:
         """Go where what is done next begins, and tell the tick; what was recorded after it is left to undo."""
-        tick = self._next
+        tick = self.next_tick
         self.replay.head_for(tick)
         if tick < self.end:
             self._cut(tick)
@@ -295,7 +300,7 @@ class Recording:
             self.replay.use(self._base)
             self.replay.pass_time(tick)
             self._target = None if self.tick == tick else tick
-        self._beyond, self._went_back = 0, False
+        self._beyond, self._went_back, self._changes_at = 0, False, None
         return tick
 
     def _cut(self, tick: int) -> None:
@@ -309,6 +314,7 @@ class Recording:
 
     def _use(self, recipe: Recipe) -> None:
         """Simulate another recipe; what differs in the past is made again over the next frames."""
+        self._changes_at = None
         before, replay = self._live, self.replay
         if recipe is before or recipe == before:
             self._live = recipe
@@ -330,7 +336,6 @@ class Recording:
     def _use_edited(self, recipe: Recipe) -> None:
         check_size(recipe, self._base)
         self._use(recipe)
-        self._changes_at = None
 
     def _show(self, recipe: Recipe) -> None:
         """Another state of the work, with the playhead at its end."""

@@ -334,6 +334,30 @@ def test_a_slider_that_is_dragged_is_one_edit(session: Session) -> None:
     assert len(session.recipe.change) == 1
 
 
+@pytest.mark.parametrize("tick", [0, 3])
+@pytest.mark.parametrize("forces", [(), (VortexForce(kind="vortex", point=(0.5, 0.5)),)], ids=["", "with a force"])
+def test_a_setting_that_is_dragged_changes_where_one_that_is_clicked_does(
+    session: Session, tick: int, forces: tuple[VortexForce, ...]
+) -> None:
+    """At tick 0, before strokes, it came to the tick after."""
+    paint(session, "push", (0.3, 0.5), (0.5, 0.5))
+    session.settle()
+    session.edit("Force", force=forces)
+    made = list[Recipe]()
+    for values in ((3.0,), (1.0, 2.0, 3.0)):
+        session.seek(tick)
+        session.settle()
+        for drag in values:
+            session.preview_change(drag=drag)
+            session.advance(1)
+        session.commit("Drag")
+        made.append(session.recipe)
+        assert session.recipe.fluid_at(tick).drag == 3.0
+        session.undo()
+    clicked, dragged = made
+    assert dragged == clicked
+
+
 def test_what_is_set_to_what_it_is_already_is_no_edit(session: Session) -> None:
     """It was one where the last change is at an earlier tick, and took away what came after a playhead sent back."""
     paint(session, "push", (0.3, 0.5), (0.5, 0.5))
