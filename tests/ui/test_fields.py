@@ -22,6 +22,7 @@ from app.model.picture import Picture
 from app.model.presets import DEFAULT, PUTTY
 from app.model.recipe import Output, Recipe
 from app.model.strokes import BrushPath, Change, Stroke
+from app.model.tools import TOOL, BrushSettings, Press
 from app.progress import Progress
 from app.ui.editor_state import EditorState
 from app.ui.events import LEFT, Button, Move
@@ -30,6 +31,7 @@ from app.ui.export_dialog import ExportDialog
 from app.ui.files import load_any
 from app.ui.panels import inspector
 from app.ui.preferences import Preferences
+from app.ui.units import PER_SECOND
 from app.ui.widgets import Ui
 from app.work.export import run
 from app.work.jobs import Job
@@ -100,6 +102,32 @@ def test_a_slider_of_the_fluid_sets_its_number(
     robot.rest()
     assert changed(before, session.recipe.fluid_at(session.end).model_dump()) == {name: 1.25}
     assert session.document.history.entries[-1].name == label
+
+
+def test_a_setting_is_shown_as_it_is_where_it_would_be_changed(
+    robot: Robot, widgets: Widgets, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """While time stands still before strokes that wait, it was shown as it is at the playhead, and set behind them."""
+    session = robot.editor.session
+    session.begin_with(viscosity=1.0, drag=1.5)
+    for y in (0.3, 0.6):
+        session.press(TOOL["push"], Press(BrushSettings(), False, session.extent, session.dt), 0.3, y)
+        session.move(0.6, y)
+        session.release()
+    session.change(PUTTY.name, viscosity=PUTTY.viscosity, drag=PUTTY.drag)
+    session.pause()
+    only(robot, "fluid")
+    drawn = Drawn(monkeypatch, ("add_text",))
+    robot.frame(count=2)
+    assert session.tick < session.end
+    assert not session.is_moving
+    said = [line.rpartition("| ")[2] for line in drawn.take()]
+    assert PER_SECOND.text(PUTTY.drag) in said
+    assert f"{PUTTY.line}." in said
+    assert PER_SECOND.text(1.5) not in said
+    widgets.type("Drag", "2.5")
+    assert [change.tick for change in session.recipe.change] == [session.end]
+    assert session.recipe.change[0].drag == 2.5
 
 
 def test_the_middle_of_the_viscosity_is_that_of_its_decades(robot: Robot, widgets: Widgets) -> None:

@@ -9,8 +9,8 @@ from app.work.session import Session
 
 
 def choose(ui: Ui, name: str, session: Session, state: EditorState, width: float = 0.0) -> Feel | None:
-    """Let the fluid feel so from the playhead on, and pushes be as local as is best for it; the feel until now."""
-    fluid = session.recipe.fluid_at(session.target)
+    """Let the fluid feel so from where work goes on, and pushes be as local as is best for it; the feel until now."""
+    fluid = session.recipe.fluid_at(session.next_tick)
     now = next((number for number, feel in enumerate(FEELS) if feel.fits(fluid)), -1)
     chosen = ui.segmented(name, [feel.name for feel in FEELS], now, width)
     if chosen != now:

@@ -283,7 +283,7 @@ def _set_held(session: Session, label: str, name: str, slid: Slid, **setting: An
 
 
 def _fluid(ui: Ui, session: Session, state: EditorState) -> None:
-    fluid = session.recipe.fluid_at(session.target)
+    fluid = session.recipe.fluid_at(session.next_tick)
     now = feels.choose(ui, "feel", session, state, -1)
     ui.dim(f"{now.line}." if now else "Your own mixture.")
     viscosity = max(fluid.viscosity, 1e-5)
