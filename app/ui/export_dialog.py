@@ -351,6 +351,8 @@ class ExportDialog(Dialog):
             ui.wrapped("Ends where the recipe's [stop] is met, if that is earlier.", ui.palette.dim, 13)
         ui.dim("Simulate on the grid")
         choices.finer = ui.segmented("finer", [label for label, _ in FINER], choices.finer, -1)
+        if said := self.job().too_fine:  # before a preview takes as long, too
+            ui.wrapped(f"{heading(said)}.", ui.palette.text, 13)
         if choices.finer and choices.kind != MAP:
             more = "Finer detail, longer work; it may look a little different from what you see."
             ui.wrapped(more, ui.palette.dim, 13)

@@ -20,7 +20,7 @@ from app.media.pictures import write_picture
 from app.media.project import from_picture
 from app.model.picture import Picture
 from app.model.presets import DEFAULT, PUTTY
-from app.model.recipe import Output, Recipe
+from app.model.recipe import FluidSettings, Output, Recipe
 from app.model.strokes import BrushPath, Change, Stroke
 from app.model.tools import TOOL, BrushSettings, Press
 from app.progress import Progress
@@ -128,6 +128,29 @@ def test_a_setting_is_shown_as_it_is_where_it_would_be_changed(
     widgets.type("Drag", "2.5")
     assert [change.tick for change in session.recipe.change] == [session.end]
     assert session.recipe.change[0].drag == 2.5
+
+
+def test_a_grid_far_finer_than_the_picture_is_told_where_it_is_chosen(
+    device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It was with the export, while a preview that takes as long said nothing of it."""
+    write_picture(tmp_path / "small.png", Picture(np.zeros((45, 60, 3), np.uint8)))
+    recipe = Recipe(fluid=FluidSettings(grid=200))
+    with Robot(device, from_picture(tmp_path / "small.png", recipe)) as robot:
+        robot.key("ctrl+e")
+        asked = robot.editor.dialogs.shown[-1]
+        assert isinstance(asked, ExportDialog)
+        drawn = Drawn(monkeypatch, ())
+        for finer, grids in (
+            (0, []),
+            (1, ["A grid of 400 cells is 6.67 times as fine as the picture of 60 x 45 pixels"]),
+        ):
+            asked.choices.finer = finer
+            robot.frame(count=2)
+            drawn.take()
+            robot.frame()
+            said = [line.rpartition("| ")[2].partition(",")[0] for line in drawn.take()]
+            assert [words for words in said if words.startswith("A grid of")] == grids
 
 
 def test_the_middle_of_the_viscosity_is_that_of_its_decades(robot: Robot, widgets: Widgets) -> None:
