@@ -365,7 +365,7 @@ TOOLS = (
     ),
     Tool(
         "thicken", "Thicken", "v", "Paint where the picture should resist",
-        painting("thicken", "thin"), ("Thicken", "Thin"), masks=True,
+        painting("thicken", "thin"), ("Thicken", "Thin"), back="Paint where the picture should give way", masks=True,
     ),
     Tool(
         "freeze", "Freeze", "f", "Paint what must stay as it is", painting("freeze", "thaw"), ("Freeze", "Thaw"),

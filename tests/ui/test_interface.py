@@ -413,6 +413,14 @@ def test_a_hint_is_of_the_tool_in_hand(robot: Robot, monkeypatch: pytest.MonkeyP
         said.clear()
         robot.frame()
         assert known & {*said} == {f"{hint}."}
+    robot.mods, robot.editor.state.before = Mods(), True  # which has no legend
+    for is_opposite, hint in ((False, "should resist"), (True, "should give way")):
+        robot.editor.state.choose_tool("thicken", is_opposite)
+        robot.frame(count=2)
+        said.clear()
+        robot.frame()
+        assert known & {*said} == {f"Paint where the picture {hint}."}
+    robot.editor.state.before = False
     robot.editor.state.choose_tool("handle", False)
     robot.size = (560, 500)
     robot.frame(count=2)
