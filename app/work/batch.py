@@ -31,8 +31,7 @@ def run_batch(
         jobs: processes on this machine.
         cluster: the address of a Dask scheduler, which decides instead.
         notice: is told what is waited for.
-        warn: is told that a piece of work takes long, before it does, and its outcome does not say so again; on a
-            cluster only the outcome says it.
+        warn: is told that a piece of work takes long, before it does, and its outcome does not say so again.
 
     Raises:
         UserError: if there is no such scheduler, or it goes; how many are written is said.
@@ -48,7 +47,7 @@ def run_batch(
         progress.advance()
 
     if cluster is not None:
-        run_on_cluster(tasks, cluster, count, progress, notice)
+        run_on_cluster(tasks, cluster, count, progress, notice, warn)
     elif min(jobs, len(tasks)) > 1:
         _run_in_processes(tasks, min(jobs, len(tasks)), count, progress, warn)
     else:

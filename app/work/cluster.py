@@ -32,8 +32,8 @@ class _Here(threading.local):
 _here = _Here()
 
 
-def _perform_on_worker(task: Piece) -> Outcome:
-    """In a thread of a Dask worker, which forgets a task that its client has cancelled.
+def _perform_on_worker(task: Piece, topic: str) -> Outcome:
+    """In a thread of a Dask worker, which forgets a task that its client has cancelled; warnings go by the topic.
 
     A GL context wants a process whose other threads leave its objects alone; Dask's collect garbage at any time. And a
     driver that crashes does not take the worker with it.
@@ -42,6 +42,9 @@ def _perform_on_worker(task: Piece) -> Outcome:
 
     worker = get_worker()
     key = worker.get_current_task()
+
+    def warn(said: str) -> None:
+        worker.log_event(topic, {"key": key, "said": said})
 
     def forgotten() -> bool:
         known = worker.state.tasks.get(key)
@@ -53,7 +56,7 @@ def _perform_on_worker(task: Piece) -> Outcome:
             _here.worker = Worker(_here.inbox)
         _here.worker.begin(task)
         try:
-            outcome = _outcome_of(_here.inbox, forgotten)
+            outcome = _outcome_of(_here.inbox, warn, forgotten)
         except Cancelled:
             _end_worker()
             raise
@@ -63,16 +66,17 @@ def _perform_on_worker(task: Piece) -> Outcome:
     return Outcome(task.label, DIED)
 
 
-def _outcome_of(inbox: queue.SimpleQueue[tuple[Worker, Reply]], forgotten: Callable[[], bool]) -> Outcome | None:
+def _outcome_of(
+    inbox: queue.SimpleQueue[tuple[Worker, Reply]], warn: Callable[[str], None], forgotten: Callable[[], bool]
+) -> Outcome | None:
     """What becomes of the task; None if the worker dies of it. Raises `Cancelled` once nobody wants it."""
-    warnings = list[str]()  # which come with the outcome: nothing else comes from there
     while True:
         with suppress(queue.Empty):
             _, message = inbox.get(timeout=LOOK)
             if isinstance(message, Warned):
-                warnings.append(message.said)
+                warn(message.said)
             elif not isinstance(message, Status):
-                return message and message.after(warnings)
+                return message
         if forgotten():
             raise Cancelled
 
@@ -89,9 +93,10 @@ def run_on_cluster(
     report: Callable[[Outcome], None],
     progress: Progress,
     notice: Callable[[str], None],
+    warn: Callable[[str, str], None],
 ) -> None:
     """Do all tasks where a Dask scheduler sends them; `report` is called with each outcome, `notice` with what
-    is waited for.
+    is waited for, `warn` with a task's label and what its outcome does not say again.
 
     Raises:
         UserError: if there is no such scheduler, or it goes; how many are written is said.
@@ -99,14 +104,23 @@ def run_on_cluster(
     """
     before = {task: _stamps(task) for task in tasks}
     watched, idle = time.monotonic(), False
+    inbox, warned = queue.SimpleQueue[tuple[str, str]](), set[tuple[str, str]]()
     with _client(address) as client:
+        client.subscribe_topic(client.id, lambda event: inbox.put((event[1]["key"], event[1]["said"])))
         # Dask gives the tasks of a worker that dies to the others, as often as its allowed-failures says.
-        pending = {client.submit(_perform_on_worker, task, pure=False): task for task in tasks}
+        pending = {client.submit(_perform_on_worker, task, client.id, pure=False): task for task in tasks}
+        labels = {future.key: task.label for future, task in pending.items()}
         try:
             while pending:
                 progress.check()
                 time.sleep(LOOK)
-                for future in [future for future in pending if future.done()]:
+                done = [future for future in pending if future.done()]
+                while not inbox.empty():  # where all is by now that was said before they were done
+                    key, said = told = inbox.get()
+                    if told not in warned:  # by a worker that has died since
+                        warned.add(told)
+                        warn(labels[key], said)
+                for future in done:
                     outcome = _outcome(future, pending[future])
                     if outcome is not None:
                         report(outcome)

@@ -8,9 +8,9 @@ import queue
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 
 from app.errors import Cancelled, UserError
@@ -58,10 +58,6 @@ class Outcome:
     recipe: Recipe | None = None
     is_met: bool = True
     stopped: bool = False
-
-    def after(self, warnings: Sequence[str]) -> Outcome:
-        """The same with these warnings before its notices, where nobody has been told of them yet."""
-        return replace(self, notices=(*warnings, *self.notices))
 
 
 @dataclass(frozen=True)

@@ -526,7 +526,7 @@ def test_a_cluster_loses_a_worker_and_nothing_else(folder: Path):
     ) as cluster:
         victim, other = cluster.workers[0], cluster.workers[1]
         address = victim.worker_address
-        heard, fine = list[Outcome](), list[Outcome]()
+        heard, fine = list[Outcome](), list[str]()
 
         def hear(outcome: Outcome) -> None:
             heard.append(outcome)
@@ -549,12 +549,18 @@ def test_a_cluster_loses_a_worker_and_nothing_else(folder: Path):
 
         (folder / "b.toml").write_text(FINE)
         one = spread(order(folder / "b.toml", None, Outputs(folder / "fine")), pictures[:1])
-        run_batch(one, fine.append, Progress(), cluster=cluster.scheduler_address)
+        run_batch(
+            one,
+            lambda outcome: fine.extend((*outcome.notices, "done")),
+            Progress(),
+            cluster=cluster.scheduler_address,
+            warn=lambda label, said: fine.append(f"{Path(label).name}: {said[:24]}"),
+        )
         with pytest.raises(Cancelled):
             run_batch(endless, hear, Progress(cancel=has_begun), cluster=cluster.scheduler_address)
         wait_until(lambda: not all(Path(f"/proc/{pid}").exists() for pid in at_work[-1]))
     assert failures == 0, [outcome.error for outcome in heard if outcome.error]
-    assert [said[:24] for outcome in fine for said in outcome.notices] == ["a grid of 388 cells is 4"]
+    assert fine == ["q0.png: a grid of 388 cells is 4", "done"], "before it takes its time"
     assert sorted(Path(outcome.label).name for outcome in heard) == sorted(expected)
     written = {name: data for name, data in contents(folder / "out").items() if not name.startswith(".")}
     assert written == expected  # what was killed in the middle of writing may have left its hidden file
