@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import os
-import re
 import sys
 from collections import Counter
 from collections.abc import Sequence
@@ -15,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 import typer
 from typer.core import TyperGroup
 
-from app.errors import BUG, Cancelled, UserError, shown
+from app.errors import BUG, About, Cancelled, UserError, shown
 from app.progress import INTERRUPTED, deaf_children
 
 if TYPE_CHECKING:
@@ -436,15 +435,19 @@ def _perform_many(tasks: Sequence[Piece], jobs: int, cluster: str | None, verbos
     written, repeated = 0, Counter[str]()
     failed: list[Outcome] = []
 
-    files = {task.label: [path.name for path in task.outputs.files] for task in tasks}
+    own = {
+        task.label: {task.label, Path(task.label).name, *(path.name for path in task.outputs.files)} for task in tasks
+    }
+
+    def alike(label: str, said: str) -> str:
+        """What is said of whichever picture, where it is about a file that is this one's alone."""
+        if isinstance(said, About) and said.file in own[label]:
+            return said.of(NAME + Path(said.file).suffix)
+        return said
 
     def new(label: str, *notices: str) -> list[str]:
-        # Without the picture's name, which is taken out of names of files alone: that of 8.png is in many a number.
-        stem, names = Path(label).stem, map(re.escape, files.get(label, ()))
-        own = "|".join((*names, rf"{re.escape(stem)}(?![^\W_])(?=\S*\.[A-Za-z])"))
-        alike = {said: re.sub(rf"(?<![^\W_])(?:{own})", lambda it: it[0].replace(stem, NAME), said) for said in notices}
-        found = [said for said in notices if verbose or alike[said] not in repeated]
-        repeated.update(alike.values())
+        found = [said for said in notices if verbose or alike(label, said) not in repeated]
+        repeated.update(alike(label, said) for said in notices)
         return found
 
     def warn(label: str, said: str) -> None:

@@ -30,6 +30,30 @@ def printable(name: str) -> str:
     return _UNPRINTABLE.sub("?", name)
 
 
+class About(str):
+    """A sentence that begins with the name of a file, kept apart: of other files the same is said in the same words.
+
+    Args:
+        file: its name, as it stands there.
+        said: what follows that, with what is between them.
+    """
+
+    file: str
+    said: str
+
+    def __new__(cls, file: str, said: str) -> About:
+        sentence = super().__new__(cls, f"{file}{said}")
+        sentence.file, sentence.said = file, said
+        return sentence
+
+    def __reduce__(self) -> tuple[type[About], tuple[str, str]]:
+        return About, (self.file, self.said)
+
+    def of(self, file: str) -> About:
+        """The same said of another file."""
+        return About(file, self.said)
+
+
 class UserError(Exception):
     """Something a user can mend: one line naming the file, key or number, and the mend.
 

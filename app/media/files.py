@@ -13,7 +13,7 @@ from functools import partial
 from itertools import product
 from pathlib import Path
 
-from app.errors import UserError
+from app.errors import About, UserError
 from app.media.inputs import no_name, state_of
 from app.media.leftovers import sweep, temporary_name
 from app.media.numbered import is_sequence, number_in, numbered, stands_for_files
@@ -288,7 +288,7 @@ def noticing(path: str | os.PathLike[str], notice: Callable[[str], object]) -> C
     def look(file: Path) -> None:
         if state_of(path) not in (None, before):
             told = "another program wrote this file while it was being made; what that wrote is replaced"
-            notice(f"{Path(path).name}: {told}")
+            notice(About(Path(path).name, f": {told}"))
 
     return look
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from app.errors import UserError
+from app.errors import About, UserError
 from app.media.clip import Clip
 from app.media.codecs import png
 from app.media.codecs.exr import unusual_attributes
@@ -424,7 +424,7 @@ class Losses:
         if not groups:
             return ""
         told = [f"{head} {HEADS[head][1].join(parts)}" if head in HEADS else head for head, parts in groups.items()]
-        return f"{Path(self.path).name} {'; it '.join(told)}{self._mend}"
+        return About(Path(self.path).name, f" {'; it '.join(told)}{self._mend}")
 
     @property
     def _mend(self) -> str:

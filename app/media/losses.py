@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from app.errors import About
+
 # What the codes of H.273 mean, where it is not what sRGB and BT.709 have; other codes are told as numbers.
 PRIMARIES = {5: "BT.601", 6: "BT.601", 9: "BT.2020", 10: "XYZ", 11: "DCI-P3", 12: "Display P3"}
 TRANSFERS = {4: "gamma 2.2", 5: "gamma 2.8", 8: "linear", 16: "PQ", 18: "HLG"}
@@ -14,7 +16,14 @@ REC709 = (0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329)  # primaries and whit
 
 def lost(file: Path, losses: Sequence[str]) -> str:
     """What of a file is lost, in one sentence that names it; "" if nothing."""
-    return f"{file.name}: {'; '.join(losses)}" if losses else ""
+    return About(file.name, f": {'; '.join(losses)}") if losses else ""
+
+
+def joined(note: str, other: str) -> str:
+    """Two notes in one sentence, about the file that the first is about; either may be ""."""
+    if not (isinstance(note, About) and isinstance(other, About)):
+        return note or other
+    return About(note.file, f"{note.said}; {other.said.removeprefix(': ') if other.file == note.file else other}")
 
 
 def few(names: Sequence[str]) -> str:

@@ -8,10 +8,10 @@ from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from app.errors import Cancelled, UserError
+from app.errors import About, Cancelled, UserError
 from app.media.clip import DEEP, SHALLOW, WHOLE, Clip, FrameRange
 from app.media.inputs import MAX_PIXELS
-from app.media.losses import lost
+from app.media.losses import joined, lost
 from app.media.numbered import NUMBER, check_numbers, numbered_files
 from app.media.pictures import read_picture
 from app.media.record import digest_of_file
@@ -53,7 +53,7 @@ class PictureSequence(Clip):
         notice: Callable[[str], None] = lambda said: None,
     ) -> Generator[tuple[int, Picture], None, None]:
         """See `Clip`."""
-        reported = {_without_name(self.note)}
+        reported = {_said(self.note)}
         for number in self._numbers(part):
             if cancel():
                 raise Cancelled
@@ -61,8 +61,8 @@ class PictureSequence(Clip):
                 continue
             picture = read_picture(self.files[number], self.max_pixels)
             self._check_alike(self.files[number], picture)
-            if picture.note and _without_name(picture.note) not in reported:  # once, if each has lost it
-                reported.add(_without_name(picture.note))
+            if picture.note and _said(picture.note) not in reported:  # once, if each has lost it
+                reported.add(_said(picture.note))
                 notice(picture.note)
             yield number, picture
 
@@ -106,7 +106,7 @@ def read_sequence(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) ->
         files=files,
         max_pixels=max_pixels,
     )
-    return clip, replace(first, note="; ".join(filter(None, [first.note, lost(Path(path), negative)])))
+    return clip, replace(first, note=joined(first.note, lost(Path(path), negative)))
 
 
 def _negative(path: Path) -> list[str]:
@@ -116,9 +116,9 @@ def _negative(path: Path) -> list[str]:
     return [f"of {count} files with numbers below 0 none is used"] if count else []
 
 
-def _without_name(note: str) -> str:
-    """A note about a file, without the file's name."""
-    return note.partition(": ")[2]
+def _said(note: str) -> str:
+    """What a note says, whichever file it is about."""
+    return note.said if isinstance(note, About) else note
 
 
 def _shape(picture: Picture) -> tuple[int, int, int, int]:

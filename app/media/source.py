@@ -10,7 +10,7 @@ from app.errors import UserError
 from app.media.clip import Clip, coded
 from app.media.formats import ENDINGS
 from app.media.inputs import MAX_PIXELS
-from app.media.losses import lost
+from app.media.losses import joined, lost
 from app.media.numbered import stands_for_files
 from app.media.pages import read_pages
 from app.media.pictures import read_picture
@@ -43,7 +43,7 @@ def open_source(path: Path, max_pixels: int = MAX_PIXELS, animated: bool = True)
         if animated or len(clip.files) == 1:
             return Source(picture, clip if animated else None)
         first = f"of its {len(clip.files)} frames only the first is used"
-        return Source(replace(picture, note=_joined(picture.note, lost(path, [first]))))
+        return Source(replace(picture, note=joined(picture.note, lost(path, [first]))))
     if path.suffix.lower() not in CLIP_ENDINGS:
         picture = read_picture(path, max_pixels)
         clip = read_pages(path, picture, max_pixels) if animated else None
@@ -54,8 +54,4 @@ def open_source(path: Path, max_pixels: int = MAX_PIXELS, animated: bool = True)
     if first is None:
         raise UserError(f"Cannot read {path}: it has no frame that can be decoded; get it again.")
     losses = [] if animated or clip.frames == 1 else ["of its frames only the first is used"]
-    return Source(Picture(first, note=_joined(clip.note, lost(path, losses)), chunks=coded(clip.colours)), clip)
-
-
-def _joined(*notes: str) -> str:
-    return "; ".join(filter(None, notes))
+    return Source(Picture(first, note=joined(clip.note, lost(path, losses)), chunks=coded(clip.colours)), clip)

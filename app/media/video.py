@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from app.errors import UserError
+from app.errors import About, UserError
 from app.media import ffmpeg
 from app.media.clip import HIGH, WHOLE, Colours, FileClip, FrameRange, has_changed
 from app.media.inputs import MAX_PIXELS, check_size, open_input, read_start
@@ -125,7 +125,8 @@ class Video(FileClip):
         self._check_unchanged(begins=True)
         dtype = np.dtype(np.uint8 if self.bits == 8 else np.uint16)
         shape = self.height, self.width, channels
-        with ffmpeg.Ffmpeg(arguments, str(self.path), doing="read", cancel=cancel, level="info") as process:
+        name = str(self.path)
+        with ffmpeg.Ffmpeg(arguments, name, doing="read", cancel=cancel, level="info") as process:
             count = first
             try:
                 for block in process.blocks(int(np.prod(shape)) * dtype.itemsize):
@@ -137,12 +138,12 @@ class Video(FileClip):
             self._check_unchanged()
             if len(sizes := process.sizes()) > 1:
                 shown = f"{self.width} x {self.height}"
-                notice(f"{self.path}: its frames are of {' and '.join(sizes)} pixels, and all become {shown}")
+                notice(About(name, f": its frames are of {' and '.join(sizes)} pixels, and all become {shown}"))
             if complaint := process.complaint():
-                notice(f"{self.path} is damaged, and what could be read of it was used (ffmpeg says: {complaint})")
+                notice(About(name, f" is damaged, and what could be read of it was used (ffmpeg says: {complaint})"))
             elif self.frames is not None and count < self.frames - max(2, self.fps):  # by more than a second
                 besides = ": its sound is longer, or it was cut" if self.sounds else ""
-                notice(f"{self.path} should have about {self.frames} frames by its length, and has {count}{besides}")
+                notice(About(name, f" should have about {self.frames} frames by its length, and has {count}{besides}"))
 
     def _check_unchanged(self, begins: bool = False) -> None:
         """Raise `UserError` if the file is not as it was: the frames would be fewer, or some of another clip.

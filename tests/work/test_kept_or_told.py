@@ -846,17 +846,33 @@ def test_what_belongs_to_an_animated_picture_is_kept_or_told(tmp_path: Path, flu
 
 @pytest.mark.parametrize("output", ["{name}.exr", "to_{name}_2.exr", "{name} warped.exr", "w{name}w.exr"])
 def test_what_many_pictures_lose_alike_is_told_of_the_first(tmp_path: Path, fluidwarp: Run, output: str) -> None:
+    """Also where their names are words of what is written, or of what is said."""
     (tmp_path / "still.toml").write_text(RECIPE)
     (tmp_path / "out").mkdir()
-    for number in range(4):
-        Image.fromarray(smooth()).save(tmp_path / f"p{number}.jpg", xmp=XMP if number else b"")
-    names = [f"p{number}.jpg" for number in range(4)]
-    ran = fluidwarp(tmp_path, "render", "still.toml", *names, "-o", f"out/{output}")
-    said = "lacks the picture's XMP; write .png to keep it"
+    names = ["p", "warped", "w", "to", "XMP", "2"]
+    for name in names:
+        Image.fromarray(smooth()).save(tmp_path / f"{name}.jpg", xmp=b"" if name == "p" else XMP)
+    ran = fluidwarp(tmp_path, "render", "still.toml", *(f"{name}.jpg" for name in names), "-o", f"out/{output}")
+    said, first = "lacks the picture's XMP; write .png to keep it", output.format(name="warped")
     assert ran.returncode == 0
-    assert ran.stderr == (
-        f"fluidwarp: {tmp_path}/p1.jpg: {output.format(name='p1')} {said}\nfluidwarp: and of 2 more: {output} {said}\n"
-    )
+    assert ran.stderr.splitlines() == [
+        f"fluidwarp: {tmp_path}/warped.jpg: {first} {said}", f"fluidwarp: and of 4 more: {{name}}.exr {said}"
+    ]  # fmt: skip
+
+
+def test_what_many_clips_lose_alike_is_told_of_the_first_also_where_processes_share_them(
+    tmp_path: Path, fluidwarp: Run
+) -> None:
+    (tmp_path / "still.toml").write_text(RECIPE)
+    names = ["a.mkv", "its.mkv", "3.mkv"]
+    for name in names:
+        made = ["-f", "lavfi", "-i", f"testsrc=s={WIDTH}x{HEIGHT}:r=10:d=0.3,setsar=3/2", "-c:v", "ffv1"]
+        subprocess.run([ffmpeg.executable(), "-v", "error", "-y", *made, str(tmp_path / name)], check=True)
+    ran = fluidwarp(tmp_path, "render", "still.toml", *names, "-o", "{name}.png", "--jobs", "2")
+    first, rest = ran.stderr.splitlines()
+    said = "its pixels of 3:2 become square; of its frames only the first is used"
+    assert first in [f"fluidwarp: {tmp_path / name}: {said}" for name in names]
+    assert rest == f"fluidwarp: and of 2 more: {{name}}.mkv: {said}"
 
 
 def test_what_is_said_of_many_pictures_in_the_same_words_is_told_once_whatever_their_names(
