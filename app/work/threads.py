@@ -6,7 +6,7 @@ import queue
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from typing import Generic, TypeVar
+from typing import TypeVar
 
 from app.errors import UserError
 
@@ -90,52 +90,35 @@ def prefetch(items: Iterator[T]) -> Iterator[Iterator[T]]:
 
     When the block ends before the items do, `items` is closed if it is a generator.
     """
-    reader = _Prefetched(items)
-    try:
-        yield reader
-    finally:
-        reader.close()
+    ready: queue.Queue[object] = queue.Queue(DEPTH)
+    failed: list[BaseException] = []
+    stopped = threading.Event()
 
-
-class _Prefetched(Generic[T]):
-    def __init__(self, items: Iterator[T]) -> None:
-        self._items = items
-        self._ready: queue.Queue[object] = queue.Queue(DEPTH)
-        self._stopped = threading.Event()
-        self._failed: BaseException | None = None
-        self._thread = threading.Thread(target=self._work, name="reader", daemon=True)
-        self._thread.start()
-
-    def __iter__(self) -> Iterator[T]:
-        return self
-
-    def __next__(self) -> T:
-        item = self._ready.get()
-        if item is _END:
-            self._ready.put(_END)
-            if self._failed is not None:
-                raise self._failed
-            raise StopIteration
-        return item  # type: ignore[return-value]
-
-    def close(self) -> None:
-        """Let the thread come to its end."""
-        self._stopped.set()
-        while self._thread.is_alive():
-            try:
-                self._ready.get(timeout=0.01)
-            except queue.Empty:
-                continue
-
-    def _work(self) -> None:
+    def work() -> None:
         try:
-            for item in self._items:
-                self._ready.put(item)
-                if self._stopped.is_set():
+            for item in items:
+                ready.put(item)
+                if stopped.is_set():
                     break
         except BaseException as error:
-            self._failed = error
+            failed.append(error)
         finally:
-            if (close := getattr(self._items, "close", None)) is not None:
+            if (close := getattr(items, "close", None)) is not None:
                 close()
-            self._ready.put(_END)
+            ready.put(_END)
+
+    def read() -> Iterator[T]:
+        while (item := ready.get()) is not _END:
+            yield item  # type: ignore[misc]
+        if failed:
+            raise failed[0]
+
+    thread = threading.Thread(target=work, name="reader", daemon=True)
+    thread.start()
+    try:
+        yield read()
+    finally:
+        stopped.set()
+        while thread.is_alive():
+            with suppress(queue.Empty):
+                ready.get(timeout=0.01)
