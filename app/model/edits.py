@@ -20,10 +20,8 @@ TIMED = ("stroke", "handle", "pin", "change", "mask")
 # Moves of the pointer, and ticks: minutes of the fastest mouse, and of holding still. Below `LONGEST_HAND`, so that a
 # mask that has been painted can be read again.
 LONGEST_GESTURE = 50_000
-ROOM = (
-    100,
-    8 * LONGEST_GESTURE,
-)  # words and numbers that there is to be room for before one: half of it for holding still
+# Words and numbers that there is to be room for before one: half of it for holding still.
+ROOM = (100, 8 * LONGEST_GESTURE)
 
 
 def cut_off(recipe: Recipe, tick: int) -> Recipe:

@@ -17,21 +17,14 @@ import numpy as np
 from app.errors import UserError
 from app.media.files import make_folder, replacing
 from app.media.inputs import Archive, open_input
-from app.model.recipe import Recipe
 from app.work.replay import Replay
 
 EVERY = 64  # ticks between two states
 BUDGET = 4 * 2**30  # bytes of a folder
 FORMAT = 2
 SUFFIX = ".state.npz"
-NOT_SIMULATED = {
-    "name",
-    "time",
-    "stop",
-    "output",
-    "edges",
-    "amount",
-}  # parts of a recipe that the fluid knows nothing of
+# Parts of a recipe that the fluid knows nothing of.
+NOT_SIMULATED = {"name", "time", "stop", "output", "edges", "amount"}
 
 
 class StoredStates:
@@ -135,15 +128,11 @@ def _digest(replay: Replay) -> str:
     """What stands for a simulation: the same for two that come to the same bits."""
     told = hashlib.sha256(code().encode())
     told.update(replay.device.limits.renderer.encode() + replay.device.limits.version.encode())
-    told.update(_simulated(replay.recipe).encode())
+    told.update(replay.recipe.model_dump_json(exclude=NOT_SIMULATED).encode())
     for part in replay.pictures.values(replay.recipe):
         told.update(f"{part.shape} {part.dtype}".encode())
         told.update(np.ascontiguousarray(part).data.cast("B"))
     return told.hexdigest()[:32]
-
-
-def _simulated(recipe: Recipe) -> str:
-    return recipe.model_dump_json(exclude=NOT_SIMULATED)
 
 
 @cache

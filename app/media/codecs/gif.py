@@ -73,13 +73,8 @@ def frames(data: bytes, loop: int | None) -> Animation | None:
 
 def _within(frame: Frame, size: tuple[int, int]) -> Frame:
     """A frame without what of it is beyond the picture."""
-    width, height = (
-        max(0, min(length, most - at))
-        for length, most, at in (
-            (frame.width, size[0], frame.x),
-            (frame.height, size[1], frame.y),
-        )
-    )
+    width = max(0, min(frame.width, size[0] - frame.x))
+    height = max(0, min(frame.height, size[1] - frame.y))
     return frame if (width, height) == (frame.width, frame.height) else replace(frame, width=width, height=height)
 
 

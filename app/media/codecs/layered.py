@@ -87,9 +87,8 @@ class Animation:
         would be more than `most` pixels, it is believed that what can have alpha has it.
         """
         asked = list[tuple[Frame, tuple[slice, slice]]]()
-        cleared: Frame | None = Frame(
-            0, 0, *self.size, Fraction(0), BACKGROUND, False, (), False, 0
-        )  # as all is at first
+        # All is, at first.
+        cleared: Frame | None = Frame(0, 0, *self.size, Fraction(0), BACKGROUND, False, (), False, 0)
         for number, frame in enumerate(self.frames):
             if cleared is not None and not frame.covers(cleared):
                 return True
