@@ -392,12 +392,7 @@ def _perform(piece: Piece, given: list[Path], jobs: int, cluster: str | None, gp
         return
     piece = piece.named()
     states = no_empty_folder(piece.outputs.states)
-
-    def warn(said: str) -> bool:
-        _tell(said)
-        return True
-
-    with states, ExitStack() as stack, on_terminal(piece.outputs.files[0].name, None, warn=warn) as progress:
+    with states, ExitStack() as stack, on_terminal(piece.outputs.files[0].name, None, warn=_tell) as progress:
         report = piece.perform(lambda: stack.enter_context(Device.headless()), progress)
     _tell(*report.notices, *([report.verdict] if report.verdict else []))
 

@@ -26,17 +26,11 @@ def never() -> bool:
     return False
 
 
-def unheard(_said: str) -> bool:
-    """That nobody hears a warning."""
-    return False
-
-
 class Progress:
     """Counts the steps of a job; `report(done, total)` hears of each, `cancel()` answers whether to stop.
 
     `tell(state)` hears what is being done: "writing" and the like, where a step takes long; "" is the work itself.
-    `warn(said)` hears of what the user may want to stop it for, and answers whether that has been told; if not, it is
-    among the notices of the work.
+    `warn(said)` hears of what the user may want to stop it for; without it that is among the notices of the work.
     The window passes its own callbacks; the command line uses `on_terminal`.
     """
 
@@ -46,7 +40,7 @@ class Progress:
         report: Callable[[int, int | None], None] = lambda done, total: None,
         cancel: Callable[[], bool] = never,
         tell: Callable[[str], None] = lambda state: None,
-        warn: Callable[[str], bool] = unheard,
+        warn: Callable[[str], object] | None = None,
     ) -> None:
         self._total = total
         self.done = 0
@@ -220,7 +214,7 @@ def on_terminal(
     description: str,
     total: int | None,
     at_once: Callable[[], None] | None = leave,
-    warn: Callable[[str], bool] = unheard,
+    warn: Callable[[str], object] | None = None,
 ) -> Iterator[Progress]:
     """A `Progress` drawn as a bar with the time left on stderr, silent when that is no terminal; Ctrl+C cancels.
 

@@ -52,13 +52,8 @@ def run_batch(
         _run_in_processes(tasks, min(jobs, len(tasks)), count, progress, warn)
     else:
         for task in tasks:
-            count(perform(task, Progress(cancel=progress.cancel, warn=partial(_warned, warn, task.label))))
+            count(perform(task, Progress(cancel=progress.cancel, warn=partial(warn, task.label))))
     return failures
-
-
-def _warned(warn: Warn, label: str, said: str) -> bool:
-    warn(label, said)
-    return True
 
 
 def _run_in_processes(

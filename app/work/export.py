@@ -477,8 +477,8 @@ class _Export:
 
     def _warn(self) -> None:
         """Before the first step that is simulated: where all frames are kept, there is none that could take long."""
-        if not self._has_warned and (said := self.job.too_fine) and not self.progress.warn(said):
-            self.pictures.notice(said)
+        if not self._has_warned and (said := self.job.too_fine):
+            (self.progress.warn or self.pictures.notice)(said)
         self._has_warned = True
 
     def _advance(self) -> None:

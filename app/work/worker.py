@@ -210,11 +210,7 @@ def _told(say: Callable[[Reply], None], cancel: Callable[[], bool]) -> Progress:
         now = Status(now.done, state)
         say(now)
 
-    def warn(said: str) -> bool:
-        say(Warned(said))
-        return True
-
-    return Progress(None, report, cancel, tell, warn)
+    return Progress(None, report, cancel, tell, lambda said: say(Warned(said)))
 
 
 def _take(waiting: queue.SimpleQueue[Work], finish: threading.Event) -> None:

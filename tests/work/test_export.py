@@ -88,10 +88,6 @@ def test_a_grid_far_finer_than_the_picture_is_told_before_it_takes_its_time(devi
     order = list[str]()
     outputs, small = Outputs(tmp_path / "x.png"), Picture(scene())
 
-    def warn(said: str) -> bool:
-        order.append(said)
-        return hears
-
     def step(done: int, total: int | None) -> None:
         if done:
             order.append("step")
@@ -99,11 +95,13 @@ def test_a_grid_far_finer_than_the_picture_is_told_before_it_takes_its_time(devi
     for cells, is_told, hears in (384, False, True), (388, True, True), (388, True, False):
         order.clear()
         recipe = Recipe.parse(WHIRL).on_grid(cells).edited(duration=0.02)
-        report = run(device, Job(recipe, small, tmp_path, outputs), Progress(warn=warn, report=step))
+        report = run(
+            device, Job(recipe, small, tmp_path, outputs), Progress(warn=order.append if hears else None, report=step)
+        )
         said = "a grid of 388 cells is 4.04 times as fine as the picture of 96 x 64 pixels, and takes long; "
         said += "one of 96 is as fine"
         assert list(report.notices) == [said] * (is_told and not hears), "with the result, if nobody heard of it before"
-        assert order[:2] == ([said, "step"] if is_told else ["step", "step"])
+        assert order[:2] == ([said, "step"] if is_told and hears else ["step", "step"])
 
 
 def render(device: Device, recipe: str, source: Path, output: Path | None, **options: object) -> None:
