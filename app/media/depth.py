@@ -2,9 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from app.model.picture import linear_to_srgb, srgb_to_linear
+
+VALUES_AT_ONCE = 500_000
+
+
+def few_rows(array: np.ndarray) -> Iterator[slice]:
+    """The rows of an array, a few at a time, so that what is made of them takes no more memory for a larger one."""
+    rows = max(1, VALUES_AT_ONCE // max(1, array[0].size))
+    for top in range(0, len(array), rows):
+        yield slice(top, top + rows)
 
 
 def to_bits(pixels: np.ndarray, bits: int, *, dither: bool = True) -> np.ndarray:
@@ -17,9 +28,8 @@ def to_bits(pixels: np.ndarray, bits: int, *, dither: bool = True) -> np.ndarray
         return pixels
     out = np.empty(pixels.shape, {8: np.uint8, 16: np.uint16, 32: np.float32}[bits])
     noise = np.random.default_rng(0) if dither and bits == 8 else None
-    rows = max(1, 500_000 // max(1, pixels[0].size))
-    for top in range(0, len(pixels), rows):
-        out[top : top + rows] = _strip_to_bits(pixels[top : top + rows], bits, noise)
+    for rows in few_rows(pixels):
+        out[rows] = _strip_to_bits(pixels[rows], bits, noise)
     return out
 
 
@@ -47,25 +57,23 @@ def spread(pixels: np.ndarray, bits: int, to: int) -> np.ndarray:
     """Codes of `bits` bits in 8 or 16, which are more, black and white where they are; works in strips."""
     kind, (top, most) = {8: np.uint8, 16: np.uint16}[to], (2**bits - 1, 2**to - 1)
     out = np.empty(pixels.shape, kind)
-    rows = max(1, 500_000 // max(1, pixels[0].size))
-    for first in range(0, len(pixels), rows):
-        out[first : first + rows] = pixels[first : first + rows].astype(np.uint32) * np.uint32(most) // np.uint32(top)
+    for rows in few_rows(pixels):
+        out[rows] = pixels[rows].astype(np.uint32) * np.uint32(most) // np.uint32(top)
     return out
 
 
 def mixed(one: np.ndarray, other: np.ndarray, share: float, *, premultiplied: bool = False) -> np.ndarray:
     """One picture (h, w, c) dissolved into another of its kind: of that a `share` between 0 and 1, in linear light."""
     out = np.empty_like(one)
-    rows = max(1, 500_000 // max(1, one[0].size))
-    for top in range(0, len(one), rows):
-        first, second = (to_bits(part[top : top + rows], 32) for part in (one, other))
+    for rows in few_rows(one):
+        first, second = (to_bits(part[rows], 32) for part in (one, other))
         first, second = (1 - share) * first, share * second
         mix = first + second
         if one.shape[2] in (2, 4) and not premultiplied:
             weights = first[..., -1:], second[..., -1:]
             colours = (first[..., :-1] * weights[0] / (1 - share), second[..., :-1] * weights[1] / share)
             np.divide(sum(colours), mix[..., -1:], out=mix[..., :-1], where=mix[..., -1:] > 0)
-        out[top : top + rows] = to_bits(mix, 8 * one.dtype.itemsize, dither=False)
+        out[rows] = to_bits(mix, 8 * one.dtype.itemsize, dither=False)
     return out
 
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+
+from app.media.depth import few_rows
 
 PixelPlaces = Literal["centres", "corners", "pixels"]
 """The places an ST map that does nothing holds in a row of W pixels, times W: .5 to W-.5, 0 to W, 0 to W-1."""
@@ -95,7 +96,7 @@ def to_st(displacement: Displacement) -> np.ndarray:
     """Absolute places (h, w, 2) float32, 0-1 over the picture, y up, pixel centres at (x + .5) / width."""
     map_, out = displacement, np.empty(displacement.values.shape, np.float32)
     x, y = _centres(map_.width, map_.overscan), _centres(map_.height, map_.overscan)
-    for rows in _strips(out):
+    for rows in few_rows(out):
         # float64 and rounded far below float32, so that a place of exactly 0 comes out of a round trip as 0
         u = (x + map_.longest * map_.values[rows, :, 0].astype(np.float64)) / map_.width
         v = 1 - (y[rows, None] + map_.longest * map_.values[rows, :, 1].astype(np.float64)) / map_.height
@@ -112,7 +113,7 @@ def from_st(st: np.ndarray, grid: PixelPlaces = "centres", overscan: int = 0) ->
     zero = 0.0 if grid == "centres" else 0.5
     x, y = _centres(width, overscan), _centres(height, overscan)
     longest = max(width, height)
-    for rows in _strips(values):
+    for rows in few_rows(values):
         values[rows, :, 0] = (st[rows, :, 0] * np.float64(step_x) + zero - x) / longest
         values[rows, :, 1] = (height - zero - st[rows, :, 1] * np.float64(step_y) - y[rows, None]) / longest
     return Displacement(values, overscan)
@@ -136,7 +137,7 @@ def folds(values: np.ndarray) -> int:
     longest, count = max(width, height), 0
     if min(width, height) < 2:
         return 0
-    for rows in _strips(values):
+    for rows in few_rows(values):
         # central differences, which want a row more on each side
         low, high = max(0, rows.start - 1), min(height, rows.stop + 1)
         down, along = np.gradient(longest * values[low:high].astype(np.float64), axis=(0, 1))
@@ -151,14 +152,8 @@ def is_beside(values: np.ndarray) -> bool:
     height, width = values.shape[:2]
     longest = max(width, height)
     x, y = ((np.arange(count) + 0.5) / longest for count in (width, height))
-    for rows in _strips(values):
+    for rows in few_rows(values):
         across, down = x + values[rows, :, 0], y[rows, None] + values[rows, :, 1]
         if ((across >= 0) & (across <= width / longest) & (down >= 0) & (down <= height / longest)).any():
             return False
     return True
-
-
-def _strips(array: np.ndarray) -> Iterator[slice]:
-    rows = max(1, 500_000 // max(1, array[0].size))
-    for top in range(0, len(array), rows):
-        yield slice(top, top + rows)

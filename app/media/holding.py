@@ -18,12 +18,12 @@ from app.media.clip import Clip
 from app.media.codecs import png
 from app.media.codecs.exr import unusual_attributes
 from app.media.codecs.metadata import profile_name, tag_names
-from app.media.depth import as_half, to_bits
+from app.media.depth import as_half, few_rows, to_bits
 from app.media.encoders import ANIMATIONS, Stream, check_colours_of_picture, depth_of, has_alpha
 from app.media.formats import Format, fits_profile, is_srgb, picture_format, written_depth
 from app.media.losses import REC709, counted, few
 from app.media.numbered import is_sequence
-from app.model.picture import Picture, srgb_to_linear, unpremultiplied
+from app.model.picture import Picture, opaque_value, srgb_to_linear, unpremultiplied
 
 PNG_STEP = png.METRE  # PNG tells whole dots a metre, and no 72 an inch
 HALF_DIGITS, FLOAT_DIGITS = 11, 24  # significant binary ones (IEEE 754)
@@ -31,7 +31,6 @@ LARGEST_HALF = 65520.0  # what is less is rounded to a half that is finite
 # What is named first where several hold what is lost: of stills, of those with floats, of animations.
 BETTER, BETTER_LIGHT = (".png", ".tif", ".exr", ".webp", ".jpg"), (".exr", ".tif", ".png")
 BETTER_MOVING = (".mkv", ".mov", ".webm")
-VALUES_AT_ONCE = 500_000
 
 
 @dataclass(frozen=True)
@@ -111,22 +110,14 @@ Told = Callable[[Picture, Room], str]
 
 def _strips(picture: Picture) -> Iterator[np.ndarray]:
     """The pixels, a few rows at a time."""
-    pixels = picture.pixels
-    rows = max(1, VALUES_AT_ONCE // max(1, pixels[0].size))
-    for top in range(0, len(pixels), rows):
-        yield pixels[top : top + rows]
+    return (picture.pixels[rows] for rows in few_rows(picture.pixels))
 
 
 def _straight(picture: Picture) -> Iterator[np.ndarray]:
     """The pixels as they are before they are cut to whole numbers."""
     is_multiplied = picture.premultiplied and picture.has_alpha
     for strip in _strips(picture):
-        yield strip if not is_multiplied or (strip[..., -1] == _opaque(picture)).all() else unpremultiplied(strip)
-
-
-def _opaque(picture: Picture) -> int:
-    """The alpha of a pixel that hides what is below it."""
-    return 1 if picture.linear else np.iinfo(picture.pixels.dtype).max
+        yield strip if not is_multiplied or (strip[..., -1] == opaque_value(strip)).all() else unpremultiplied(strip)
 
 
 def _depth(picture: Picture, room: Room) -> str:
@@ -239,7 +230,7 @@ def _nowhere(picture: Picture, room: Room) -> str:
 def _alpha(picture: Picture, room: Room) -> str:
     if not picture.has_alpha or room.has_partial:
         return ""
-    most = _opaque(picture)
+    most = opaque_value(picture.pixels)
     for strip in _strips(picture):
         alpha = strip[..., -1]
         if not room.has_alpha and (alpha != most).any():

@@ -129,10 +129,15 @@ def linear_to_srgb(values: np.ndarray) -> np.ndarray:
     return np.where(values <= 0.0031308, values * 12.92, 1.055 * np.maximum(values, 0.0031308) ** (1 / 2.4) - 0.055)
 
 
+def opaque_value(pixels: np.ndarray) -> int:
+    """The alpha of a pixel that hides what is below it."""
+    return 1 if pixels.dtype == np.float32 else np.iinfo(pixels.dtype).max
+
+
 def unpremultiplied(pixels: np.ndarray) -> np.ndarray:
     """Pixels (h, w, 2 or 4) with straight alpha from premultiplied; colour where alpha is 0 is left as it is."""
     alpha = pixels[..., -1:].astype(np.float32)
-    whole = 1.0 if pixels.dtype == np.float32 else np.iinfo(pixels.dtype).max
+    whole = opaque_value(pixels)
     with np.errstate(all="ignore"):  # what is infinite or NaN stays so
         scale = np.divide(whole, alpha, out=np.ones_like(alpha), where=alpha > 0)
         colours = pixels[..., :-1] * scale

@@ -33,7 +33,7 @@ from app.media.maps import map_writer, write_map
 from app.media.numbered import is_sequence
 from app.media.record import Record, digest_of
 from app.model.handles import ARRIVED
-from app.model.picture import Picture
+from app.model.picture import Picture, opaque_value
 from app.model.recipe import Recipe
 from app.model.timeline import Dissolve, Sentinel, Timeline, dissolved, frame_positions
 from app.progress import Progress
@@ -678,8 +678,3 @@ def with_alpha(pixels: np.ndarray) -> np.ndarray:
     if pixels.shape[2] in (2, 4):
         return pixels
     return np.concatenate([pixels, np.full_like(pixels[..., :1], opaque_value(pixels))], axis=2)
-
-
-def opaque_value(pixels: np.ndarray) -> int:
-    """The alpha of a pixel that hides what is below it."""
-    return 1 if pixels.dtype == np.float32 else np.iinfo(pixels.dtype).max

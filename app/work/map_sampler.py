@@ -8,7 +8,8 @@ import numpy as np
 
 from app.media.displacement import Displacement, MapError, check_size, cropped, folds, is_beside
 from app.media.numbered import is_sequence
-from app.work.export import Target, looked_up, opaque_value, with_alpha
+from app.model.picture import opaque_value
+from app.work.export import Target, looked_up, with_alpha
 from app.work.layers import widened
 from solver.gl.device import Device
 from solver.gl.field import FieldError
