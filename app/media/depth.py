@@ -1,4 +1,4 @@
-"""Pixels in another depth, and without alpha."""
+"""Pixels in another depth, with alpha and without."""
 
 from __future__ import annotations
 
@@ -82,6 +82,16 @@ def over(pixels: np.ndarray, background: tuple[int, int, int]) -> np.ndarray:
     alpha = pixels[..., -1:].astype(np.float32) / 255
     ground = np.asarray(background if pixels.shape[2] == 4 else [np.mean(background)], np.float32)
     return (pixels[..., :-1] * alpha + ground * (1 - alpha) + 0.5).astype(np.uint8)
+
+
+def rgba(pixels: np.ndarray) -> np.ndarray:
+    """Grey or colours (h, w, c) uint8, with alpha or none, as colours with alpha."""
+    channels = pixels.shape[2]
+    if channels == 4:
+        return pixels
+    colours = pixels[..., [0, 0, 0]] if channels < 3 else pixels
+    alpha = pixels[..., 1:] if channels == 2 else np.full_like(pixels[..., :1], 255)
+    return np.concatenate([colours, alpha], axis=2)
 
 
 def as_half(values: np.ndarray) -> np.ndarray:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from app.errors import UserError
+from app.media.depth import rgba
 from app.media.files import make_folder
 from app.media.pictures import read_picture, write_picture
 from app.model.picture import Picture
@@ -82,11 +83,7 @@ class Giving:
 
 def give(path: str) -> None:
     """Put a picture's file, of 8 bits, on the clipboard."""
-    pixels = read_picture(path).pixels
-    if pixels.shape[2] < 3:
-        pixels = np.concatenate([pixels[..., :1].repeat(3, axis=2), pixels[..., 1:]], axis=2)
-    if pixels.shape[2] == 3:
-        pixels = np.concatenate([pixels, np.full((*pixels.shape[:2], 1), 255, np.uint8)], axis=2)
+    pixels = rgba(read_picture(path).pixels)
     height, width = pixels.shape[:2]
     _library().copy_image(np.ascontiguousarray(pixels).tobytes(), width, height, detach=sys.platform == "linux")
 

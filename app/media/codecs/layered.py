@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from app.media.codecs.decoding import quiet
+from app.media.depth import rgba
 
 NONE, BACKGROUND, PREVIOUS = range(3)  # what becomes of a frame when the next one comes
 PNG, GIF = b"\x89PNG", b"GIF"  # the start of one
@@ -143,7 +144,7 @@ def _decoded(frame: Frame) -> Iterator[tuple[slice, np.ndarray]]:
     samples = _samples(file) if image is None else np.empty(0)
     for rows in (slice(row, min(row + band, frame.height)) for row in range(0, frame.height, band)):
         if image is None:
-            yield rows, _with_alpha(samples[rows])
+            yield rows, rgba(samples[rows])
         else:
             yield rows, np.asarray(image.crop((0, rows.start, frame.width, rows.stop)).convert("RGBA"))
 
@@ -177,16 +178,6 @@ def _samples(file: bytes) -> np.ndarray:
         samples: np.ndarray = decode(file)
     samples = samples[..., None] if samples.ndim == 2 else samples
     return samples if samples.dtype == np.uint8 else samples.astype("<u2", copy=False).view(np.uint8)[..., 1::2]
-
-
-def _with_alpha(samples: np.ndarray) -> np.ndarray:
-    """Grey or colours, with alpha or none, as colours with alpha."""
-    channels = samples.shape[2]
-    if channels == 4:
-        return samples
-    colours = samples[..., [0, 0, 0]] if channels < 3 else samples
-    alpha = samples[..., 1:] if channels == 2 else np.full_like(samples[..., :1], 255)
-    return np.concatenate([colours, alpha], axis=2)
 
 
 def _lay_over(drawn: np.ndarray, below: np.ndarray) -> None:
