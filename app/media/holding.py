@@ -42,6 +42,7 @@ class Written:
         animated: it is one of many, in one file or in a sequence.
         with_layers, with_margins: whether these were warped, as they are for a still that shows its own pixels.
         with_dpi: whether its own resolution is written.
+        strip: its metadata are left out, as was asked for; of them nothing is lost.
         clip: that it is a frame of.
     """
 
@@ -51,6 +52,7 @@ class Written:
     with_layers: bool = True
     with_margins: bool = True
     with_dpi: bool = True
+    strip: bool = False
     clip: Clip | None = None
 
 
@@ -392,12 +394,13 @@ class Losses:
 
     def look(self, picture: Picture) -> Picture:
         """See what of one is lost; it is given back."""
-        room = room_of(self.path, picture, self.how)
+        wanted = picture.stripped() if self.how.strip else picture
+        room = room_of(self.path, wanted, self.how)
         self._is_light = self._is_light or picture.linear
         for key, told in TABLE.items():
-            if key not in self._found and (said := told(picture, room)):
+            if key not in self._found and (said := told(wanted, room)):
                 self._found[key] = said
-                self._better = {ending for ending in self._better if self._would_hold(ending, key, picture)}
+                self._better = {ending for ending in self._better if self._would_hold(ending, key, wanted)}
         return picture
 
     @property

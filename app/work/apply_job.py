@@ -7,7 +7,7 @@ from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from pathlib import Path
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 
@@ -19,7 +19,6 @@ from app.media.displacement import Displacement, PixelPlaces, cropped, folds
 from app.media.encoders import check_colours, check_colours_of_picture, check_output, passes, unheld_of_clip
 from app.media.files import check_kept, noticing, writable
 from app.media.formats import picture_format
-from app.media.holding import Losses, Written
 from app.media.inputs import MAX_PIXELS
 from app.media.maps import Kind, read_map, telling_of
 from app.media.numbered import check_numbers, is_sequence, numbered_files, stands_for_files
@@ -169,8 +168,8 @@ class _Applying:
         steps = steps_for(self.size)
         self.progress.total = 2 * steps
         given, picture = self._map(self._files[0]), self.source.picture
-        losses = self._losses(with_margins=self._fits(given, picture))
-        self._look(losses, picture)
+        losses = self.outputs.losses(with_margins=self._fits(given, picture))
+        losses.look(picture)
         self.notices.append(losses.said)
         self.progress.enter("")
         warped = self._warped(given, picture, lambda height: self.progress.parts(steps, height), alpha=True)
@@ -178,16 +177,6 @@ class _Applying:
         self.outputs.write(warped, self.order.quality, self._whole)
         self.progress.count(steps)
         return 1
-
-    def _losses(self, **how: Any) -> Losses:
-        """For what of the pictures the output does not hold; see `Written`."""
-        outputs = self.outputs
-        return Losses(self.output, Written(bits=outputs.bits, codec=outputs.codec, with_dpi=outputs.keeps_dpi, **how))
-
-    def _look(self, losses: Losses, picture: Picture) -> Picture:
-        """See what of a picture is lost, but for what is left out because it was asked to be."""
-        losses.look(picture.stripped() if self.outputs.strip else picture)
-        return picture
 
     def _fits(self, given: Displacement, picture: Picture) -> bool:
         """Whether what lies beyond the display window has a place in the map: in one of the same pixels only."""
@@ -228,7 +217,7 @@ class _Applying:
             if outputs.part != WHOLE:
                 until = max(self._files) if last is None else last
                 check_numbers(order.maps.path, self._files, range(first, until + 1))
-        losses = self._losses(
+        losses = outputs.losses(
             animated=True,
             with_layers=is_own,
             with_margins=is_own and self._fits(self._map(self._files[min(self._files)]), self.source.picture),
@@ -246,13 +235,13 @@ class _Applying:
             pictures: Iterator[tuple[int, Picture]]
             if clip:
                 if not clip.is_whole:
-                    self._look(losses, self.source.picture)  # what belongs to all frames is with the first
+                    losses.look(self.source.picture)  # what belongs to all frames is with the first
                 frames = clip.pictures(outputs.part, kept, progress.cancel, self.notices.append)
                 read = stack.enter_context(prefetch(frames))
-                pictures = ((number, self._look(losses, one)) for number, one in read)
+                pictures = ((number, losses.look(one)) for number, one in read)
             else:
                 numbers = [number for number in self._files if first <= number and (last is None or number <= last)]
-                self._look(losses, self.source.picture)
+                losses.look(self.source.picture)
                 pictures = ((number, self.source.picture) for number in numbers if not kept(number))
             writer = animation_writer(
                 self.output,

@@ -28,7 +28,7 @@ from app.media.displacement import Displacement
 from app.media.encoders import passes, unheld_of_clip
 from app.media.files import noticing, replacing, telling
 from app.media.formats import picture_format
-from app.media.holding import Losses, Written
+from app.media.holding import Losses
 from app.media.maps import map_writer, write_map
 from app.media.numbered import is_sequence
 from app.media.record import Record, digest_of
@@ -115,7 +115,7 @@ class _Export:
         self.written: list[Path] = []
         self.whole = {path: noticing(path, self.pictures.notice) for path in self.outputs.files}
         self.sentinel = Sentinel(job.recipe.stop, job.recipe.fluid.dt)
-        self.losses = Losses(self.outputs.file, self._written) if self.outputs.file is not None else None
+        self.losses = self._losses() if self.outputs.file is not None else None
         self.numbers: list[dict[str, Any]] = []
         self.dissolves: dict[int, Dissolve] = {}
         self._position: Fraction | None = None
@@ -404,24 +404,14 @@ class _Export:
         """Whether what lies beyond the picture's display window is warped along: where they are of the same size."""
         return self._has_layers and self.size == (self.job.picture.width, self.job.picture.height)
 
-    @property
-    def _written(self) -> Written:
-        outputs, job = self.outputs, self.job
-        return Written(
-            bits=outputs.bits,
-            codec=outputs.codec,
-            animated=job.has_frames,
-            with_layers=self._has_layers,
-            with_margins=self._has_margins,
-            with_dpi=outputs.keeps_dpi,
-            clip=job.clip if job.has_frames else None,
-        )
+    def _losses(self) -> Losses:
+        animated, clip = self.job.has_frames, self.job.clip if self.job.has_frames else None
+        how = {"with_layers": self._has_layers, "with_margins": self._has_margins}
+        return self.outputs.losses(animated=animated, clip=clip, **how)
 
     def _look(self, picture: Picture) -> Picture:
-        """See what of a picture the output does not hold, but for what is left out because it was asked to be."""
-        if self.losses is not None:
-            self.losses.look(picture.stripped() if self.outputs.strip else picture)
-        return picture
+        """See what of a picture the output does not hold, if there is one."""
+        return picture if self.losses is None else self.losses.look(picture)
 
     def _still(self, picture: Picture, parts: Callable[[int], Callable[[int], None]]) -> Picture:
         """A picture warped by the map as it is, with all that is written of it; for `parts` see `Progress`."""

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import isclose
 from pathlib import Path
+from typing import Any
 
 from app.errors import UserError
 from app.media.animation import AnimationOptions
@@ -17,6 +18,7 @@ from app.media.codecs.jpeg import held_dpi
 from app.media.encoders import check_colours, check_colours_of_picture, check_output, is_animation
 from app.media.files import cannot_write, writable
 from app.media.formats import picture_format
+from app.media.holding import Losses, Written
 from app.media.inputs import MAX_PIXELS
 from app.media.maps import Kind, check_map
 from app.media.numbered import is_sequence
@@ -89,11 +91,6 @@ class Outputs:
         return [path for path in (self.file, self.stats, self.maps and self.maps.path) if path is not None]
 
     @property
-    def keeps_dpi(self) -> bool:
-        """True if a picture's own resolution is written."""
-        return self.dpi is None and not self.strip
-
-    @property
     def is_animation(self) -> bool:
         return self.file is not None and (self.animated or is_animation(self.file))
 
@@ -116,6 +113,12 @@ class Outputs:
             raise UserError("--dpi is for a single picture, and none is written; leave it out")
         if picture_format(self.file).name == "JPEG" and not isclose(held_dpi((self.dpi, self.dpi))[0], self.dpi):
             raise UserError(f"JPEG holds whole dots per inch, not {self.dpi:g}; round --dpi, or write a PNG or TIFF")
+
+    def losses(self, **how: Any) -> Losses:
+        """For what of the pictures `file` does not hold; `how` is as in `Written`."""
+        assert self.file is not None
+        common = {"bits": self.bits, "codec": self.codec, "strip": self.strip, "with_dpi": self.dpi is None}
+        return Losses(self.file, Written(**common, **how))
 
     def write(self, picture: Picture, quality: int, whole: Callable[[Path], None]) -> None:
         """Write a picture to `file` as is asked for; see `write_picture`."""
