@@ -135,12 +135,12 @@ class _Export:
     def _run(self) -> Report:
         recipe, job, outputs = self.recipe, self.job, self.outputs
         watched = not self.sentinel.is_idle
-        runs, stills = 2 if watched and job.has_frames else 1, self._steps_for_stills()
+        runs, stills = 2 if watched and outputs.has_frames else 1, self._steps_for_stills()
         self.progress.total = runs * recipe.ticks + stills
         verdict = self._run_until_stopped() if watched else None
         end = self.replay.tick if watched else recipe.ticks
         self.progress.total = runs * end + stills
-        if job.has_frames:
+        if outputs.has_frames:
             shown, self.dissolves = shown_positions(Timeline(end, recipe.fluid.dt), recipe, float(job.rate))
             count = self._write_frames(shown, end)
             maps = outputs.maps.path if outputs.maps and outputs.maps.is_sequence else None
@@ -202,9 +202,8 @@ class _Export:
 
     def _steps_for_stills(self) -> int:
         """What the last picture and the last map count as, looked up and written."""
-        job = self.job
         file, maps = self.outputs.file, self.outputs.maps
-        sizes = [self.size] if file is not None and not job.has_frames else []
+        sizes = [self.size] if file is not None and not self.outputs.has_frames else []
         sizes += [self._map_size(maps)] if maps is not None and not maps.is_sequence else []
         return sum(2 * steps_for(size) for size in sizes)
 
@@ -368,7 +367,7 @@ class _Export:
             return frame
         # The frames of an animation are all of one kind, and most of its formats have no alpha.
         file = self.outputs.file
-        alpha = not self.job.is_animation and file is not None and picture_format(file).alpha
+        alpha = not self.outputs.is_animation and file is not None and picture_format(file).alpha
         with self.device.stage("sample picture"):
             how = replace(self._how, premultiplied=picture.premultiplied)
             try:
@@ -395,8 +394,7 @@ class _Export:
     @property
     def _has_layers(self) -> bool:
         """Whether layers are warped along: of what is written as it is read, where its own pixels are moved."""
-        job = self.job
-        is_whole = self.outputs.file is not None and (self._has_own or not job.has_frames)
+        is_whole = self.outputs.file is not None and (self._has_own or not self.outputs.has_frames)
         return is_whole and self.recipe.mode != "density"
 
     @property
@@ -405,7 +403,7 @@ class _Export:
         return self._has_layers and self.size == (self.job.picture.width, self.job.picture.height)
 
     def _losses(self) -> Losses:
-        animated, clip = self.job.has_frames, self.job.clip if self.job.has_frames else None
+        animated, clip = self.outputs.has_frames, self.job.clip if self.outputs.has_frames else None
         how = {"with_layers": self._has_layers, "with_margins": self._has_margins}
         return self.outputs.losses(animated=animated, clip=clip, **how)
 
@@ -432,7 +430,7 @@ class _Export:
         try:
             height, width = picture.wide.shape[:2]
             how = replace(self._how, premultiplied=picture.premultiplied)
-            target = Target((width, height), how, parts(height), alpha=not self.job.is_animation)
+            target = Target((width, height), how, parts(height), alpha=not self.outputs.is_animation)
             wide = looked_up(self.sampler, warp, picture.wide, target)
             return picture.with_wide(
                 wide, resample_layers(picture.layers, partial(self._look_up, warp, target.size), how.quality)

@@ -201,15 +201,6 @@ class Job:
         return self.target.name
 
     @property
-    def is_animation(self) -> bool:
-        return self.outputs.is_animation
-
-    @property
-    def has_frames(self) -> bool:
-        """True if more than the end is written."""
-        return self.outputs.has_frames
-
-    @property
     def rate(self) -> Fraction:
         """Frames per second."""
         return rate_of(self.clip, self.recipe.output.fps)
@@ -243,23 +234,23 @@ class Job:
                 size=result_size(self.recipe, self.picture),
             )
             if self.clip is not None:
-                check_colours(output, outputs.codec, self.clip, self.is_animation)
-            check_colours_of_picture(output, outputs.codec, self.picture, self.is_animation)
+                check_colours(output, outputs.codec, self.clip, outputs.is_animation)
+            check_colours_of_picture(output, outputs.codec, self.picture, outputs.is_animation)
         if maps is not None:
             check_map(maps.path)
             self._check_map_size(maps)
-            if maps.is_sequence and not self.has_frames:
+            if maps.is_sequence and not outputs.has_frames:
                 raise UserError(
                     f"{maps.path} numbers the maps of an animation and {output} is a picture; "
                     f"give one map's name, or leave out --output to write the maps alone"
                 )
         start, end = self.recipe.time.start, self.recipe.duration
-        if self.has_frames and start > end:
+        if outputs.has_frames and start > end:
             late = f"the animation ends at {end:g} s, and cannot begin at {start:g} s"
             raise UserError(f"{late}; give an earlier --from, or 'time.start'", in_window=late)
-        if self.clip is not None and self.has_frames:
+        if self.clip is not None and outputs.has_frames:
             self.clip.check(outputs.part)
-        if self.has_frames and self.recipe.time.dissolve:
+        if outputs.has_frames and self.recipe.time.dissolve:
             if self.clip is not None:
                 raise UserError(f"'time.dissolve' is for a picture, and {self.clip.path} is a clip; leave it out")
             if maps is not None and maps.is_sequence:

@@ -486,7 +486,7 @@ def test_a_preset_chooses_all_that_it_says(
     dialog.folder = tmp_path
     job = dialog.job()
     job.check()
-    assert job.is_animation == (preset.kind == ANIMATION)
+    assert job.outputs.is_animation == (preset.kind == ANIMATION)
     assert job.recipe.time.ping_pong == preset.returns
     assert job.recipe.output.size is None  # the picture is smaller than any preset
     widgets.click("Animation" if preset.kind == PICTURE else "Picture")
@@ -704,7 +704,7 @@ def test_every_file_that_the_command_line_writes_can_be_exported(robot: Robot, t
                 )
                 job = dialog.job()
                 job.check()
-                assert job.is_animation == (kind == ANIMATION)
+                assert job.outputs.is_animation == (kind == ANIMATION)
                 written.add(dialog.ending)
                 if kind == ANIMATION and dialog.ending in CONTAINERS:
                     codecs.add(job.outputs.codec or next(iter(CONTAINERS[dialog.ending].codecs)))

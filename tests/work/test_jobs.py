@@ -64,7 +64,8 @@ def test_what_is_an_animation_and_what_has_frames(tmp_path: Path) -> None:
     ]
     for outputs, is_animation, has_frames, label in cases:
         one = job(tmp_path, **outputs)
-        assert (one.is_animation, one.has_frames, one.label) == (is_animation, has_frames, label)
+        written = one.outputs
+        assert (written.is_animation, written.has_frames, one.label) == (is_animation, has_frames, label)
         one.check()
     assert job(tmp_path, Recipe(output=Output(fps=29.97)), file="a.mp4").rate == Fraction(30000, 1001)
 
