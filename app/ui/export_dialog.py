@@ -571,7 +571,7 @@ class Exports:
             if self._copied is not None:
                 self._giving = Giving(process.job.target)
             else:
-                for notice in process.notices:
+                for notice in process.outcome.notices:
                     self.messages.say(heading(notice))
                 self.messages.done(f"Exported {process.job.target.name} to {process.job.target.parent}")
             return

@@ -153,8 +153,8 @@ class Fits:
             as_well = (
                 "Stopped; the best so far is kept, and not all arrive" if stopped else "Fitted as well as it could be"
             )
-            words = [f"{heading(notice)}." for notice in process.notices[:TOLD]]
-            rest = [f"{len(process.notices) - TOLD} more like these."] * (len(process.notices) > TOLD)
+            words = [f"{heading(notice)}." for notice in process.outcome.notices[:TOLD]]
+            rest = [f"{len(process.outcome.notices) - TOLD} more like these."] * (len(process.outcome.notices) > TOLD)
             self._messages.warn(
                 " ".join([f"{as_well}: {verdict}.", *words, *rest]),
                 lambda: self._workspace.session is session and session.document.recipe.handle == made.handle,

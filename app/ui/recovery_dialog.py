@@ -29,6 +29,9 @@ class Recovery:
         journals: of the works that are open; the others are beside them.
         dialogs, messages: ask and tell the person.
         restore: opens one.
+
+    Attributes:
+        offered: what can be restored, the newest first.
     """
 
     def __init__(
@@ -38,7 +41,7 @@ class Recovery:
         self._dialogs = dialogs
         self._messages = messages
         self._restore = restore
-        self._offered: list[Found] = []
+        self.offered: list[Found] = []
         self._notices: list[str] = []
         self._search: threading.Thread | None = None
         if journals.root is not None:
@@ -53,7 +56,7 @@ class Recovery:
         return self._search is not None or self._journals.are_behind
 
     def _find(self, root: Path) -> None:
-        self._offered, self._notices = recovery.find(root)
+        self.offered, self._notices = recovery.find(root)
 
     def poll(self) -> None:
         """Offer what has been found."""
@@ -62,30 +65,25 @@ class Recovery:
         self._search = None
         for notice in self._notices:
             self._messages.warn(notice)
-        if self._offered:
+        if self.offered:
             self._dialogs.show(Offer(self))
-
-    @property
-    def offered(self) -> list[Found]:
-        """What can be restored, the newest first."""
-        return self._offered
 
     def restore(self, found: Found) -> None:
         """Open one of them, and keep the others for another start."""
-        self._offered.remove(found)
+        self.offered.remove(found)
         self.later()
         self._restore(found)
 
     def discard(self, found: Found) -> None:
         """Remove one of them for good."""
-        self._offered.remove(found)
+        self.offered.remove(found)
         found.discard()
 
     def later(self) -> None:
         """Keep them all for another start."""
-        for found in self._offered:
+        for found in self.offered:
             found.leave()
-        self._offered = []
+        self.offered = []
 
 
 class Offer(Dialog):

@@ -38,11 +38,6 @@ class WorkProcess:
         # A picture is more than a pipe holds: the window would wait until the other is awake.
         threading.Thread(target=self._worker.begin, args=(work,), daemon=True).start()
 
-    @property
-    def notices(self) -> tuple[str, ...]:
-        """What the person should hear of it, once it has ended well."""
-        return self.outcome.notices
-
     def poll(self, warn: Callable[[str], object] = lambda said: None) -> None:
         """Hear how far it is; `warn` is told what the person may want to stop it for, and no notice says it again."""
         if self.is_done:

@@ -41,6 +41,7 @@ from app.ui.viewport import Rect
 from app.work import playing, recording
 from app.work.journal import Origin, Work
 from app.work.recovery import Found
+from app.work.worker import Outcome
 from solver.gl.device import Device
 from support.drawn import Drawn, new_in
 from support.editing import Robot, add_bars, export_dialog, pattern, small_project, summary
@@ -269,7 +270,7 @@ def _of_job(job: Any) -> dict[str, Any]:
 class Still:
     """A process that is at work, and gets no further."""
 
-    part, state, is_done, notices, error, outcome = 0.3, "", False, (), "", SimpleNamespace(verdict=None)
+    part, state, is_done, error, outcome = 0.3, "", False, "", Outcome("")
     last: Still
 
     def __init__(self, job: Any) -> None:
@@ -465,11 +466,11 @@ def of_work(pressing: Pressing) -> Iterator[tuple[str, Callable[[], Dialog | Non
         vars(Still.last).update(becomes)
         Given.is_done, Given.error = given is not None, given or ""
 
-    verdict = SimpleNamespace(verdict="the fluid is at rest at 1.5 s")
+    told, ended = Outcome("", notices=("a loss", "another")), Outcome("", verdict="the fluid is at rest at 1.5 s")
     yield "an export", export
     yield "an export that says what it does", lambda: export(state="writing")
-    yield "an export that went well", lambda: export(is_done=True, notices=("a loss", "another"))
-    yield "an export that a stop ended", lambda: export(is_done=True, outcome=verdict)
+    yield "an export that went well", lambda: export(is_done=True, outcome=told)
+    yield "an export that a stop ended", lambda: export(is_done=True, outcome=ended)
     yield "an export that failed", lambda: export(is_done=True, error="Cannot write a.png: there is no room.")
     yield "a copy", copy
     yield "a copy on its way", lambda: copy(is_done=True)

@@ -88,7 +88,7 @@ def test_what_is_told_before_the_work_is_heard_before_it_is_done_and_not_again(t
         assert not process.is_done
         heard.append(said)
 
-    assert ended(process, warn).notices == ()
+    assert ended(process, warn).outcome.notices == ()
     (said,) = heard
     assert said.startswith("a grid of 388 cells is 6.06 times as fine as the picture")
 
