@@ -46,10 +46,7 @@ def _table() -> list[Action]:
 
     add("Edit", "undo", "Undo", "ctrl+z", lambda c: c.workspace.undo(), repeats=True)
     add("Edit", "redo", "Redo", "ctrl+shift+z ctrl+y", lambda c: c.workspace.redo(), repeats=True)
-    for name, label, key in (
-        ("clear_velocity", "Stop all motion", "x"),
-        ("reset_warp", "Reset the warp", "ctrl+r"),
-    ):
+    for name, label, key in (("clear_velocity", "Stop all motion", "x"), ("reset_warp", "Reset the warp", "ctrl+r")):
         add("Edit", name, label, key, lambda c, n=name, label=label: c.workspace.change(label, **{n: True}))
     add("Edit", "copy_picture", "Copy the picture", "ctrl+c", lambda c: c.copy_picture())
     add("Edit", "paste", "Paste a picture", "ctrl+v", lambda c: c.files.paste())

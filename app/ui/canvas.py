@@ -163,7 +163,7 @@ class Canvas:
         if self._has_alpha or session.recipe.edges == "transparent" or replay.density is not None:
             defines["CHECKER"] = 1
             inputs |= {"light": palette.checker[1][:3], "dark": palette.checker[0][:3], "tile": 8.0 * scale * density}
-        self._add_overlays(defines, inputs, session, state, scale * density)
+        self._add_overlays(defines, inputs, state, scale * density)
         if not state.before and (masks := self._masks(session, state, seen, inputs, scale * density)):
             defines["MASKS"] = 1
             inputs |= {"masks": masks, **corner}
@@ -412,7 +412,7 @@ class Canvas:
         return level
 
     def _add_overlays(
-        self, defines: dict[str, object], inputs: dict[str, object], session: Session, state: EditorState, scale: float
+        self, defines: dict[str, object], inputs: dict[str, object], state: EditorState, scale: float
     ) -> None:
         if state.before:
             return

@@ -28,7 +28,6 @@ from app.media.numbered import is_sequence, is_there
 from app.media.pictures import read_picture
 from app.media.project import check_pictures_kept
 from app.model.handles import heading
-from app.model.recipe import Recipe
 from app.model.timeline import NEARLY, Sentinel, Timeline, steps_of
 from app.ui.canvas import shown_pixels
 from app.ui.chooser import FileChooser
@@ -174,8 +173,9 @@ class ExportDialog(Dialog):
                 "size": None if choices.size == own else choices.size,
                 "fps": choices.fps,
                 "quality": choices.quality,
+                "filter": FILTERS[choices.filter][0],
             }
-        ).model_copy(update={"filter": FILTERS[choices.filter][0]})
+        )
         part = recipe.time.model_copy(
             update={
                 "start": self.start,
@@ -198,14 +198,8 @@ class ExportDialog(Dialog):
             outputs = replace(outputs, part=self._frames)
         elif self._holds_dpi:
             outputs = replace(outputs, dpi=choices.dpi)
-        return self._of_seen(recipe, outputs)
-
-    def _of_seen(self, recipe: Recipe, outputs: Outputs) -> Job:
-        """What is done to the clip, or to the picture that is seen."""
-        folder, frame = self.session.project.folder, self.session.still
-        if self.animation:
-            return Job(recipe, self.picture, folder, outputs, self.clip)
-        return Job(recipe, self.picture, folder, outputs, frame=frame)
+        clip, frame = (self.clip, None) if self.animation else (None, session.still)
+        return Job(recipe, self.picture, session.project.folder, outputs, clip, frame)
 
     @property
     def _frames(self) -> FrameRange:
