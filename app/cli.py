@@ -211,6 +211,12 @@ def edit(
 
 # Inputs are `readable=False`: files are looked at where they are opened, so that one of many does not stop the others.
 
+RecipeName = Annotated[
+    str,
+    typer.Argument(
+        metavar="RECIPE", help="Recipe (.toml), project, or the name of a recipe that comes with fluidwarp."
+    ),
+]
 MaxPixels = Annotated[int, typer.Option(min=1, help="Refuse pictures, clips and maps with more pixels than this.")]
 Bits = Annotated[int | None, typer.Option(help="Bits per channel: 8, 16 (half in EXR) or 32. Default: the picture's.")]
 Size = Annotated[int | None, typer.Option(help="Longer side of the result, in pixels.")]
@@ -260,12 +266,7 @@ MapOverscan = Annotated[
 
 @cli.command()
 def render(
-    recipe: Annotated[
-        str,
-        typer.Argument(
-            metavar="RECIPE", help="Recipe (.toml), project, or the name of a recipe that comes with fluidwarp."
-        ),
-    ],
+    recipe: RecipeName,
     pictures: Annotated[
         list[Path] | None,
         typer.Argument(
@@ -499,12 +500,7 @@ def _about(label: str, said: str) -> str:
 
 @cli.command()
 def fit(
-    recipe: Annotated[
-        str,
-        typer.Argument(
-            metavar="RECIPE", help="Recipe (.toml), project, or the name of a recipe that comes with fluidwarp."
-        ),
-    ],
+    recipe: RecipeName,
     output: Annotated[Path, typer.Option("--output", "-o", metavar="FITTED.toml", help="Recipe to write.")],
     pairs: Annotated[
         list[Path] | None,
