@@ -23,7 +23,7 @@ from app.media.project import named_in
 from app.model.picture import Picture
 from app.model.recipe import Output, Playback, Recipe
 from app.progress import Progress
-from app.work.fit_job import Fit
+from app.work.fitting import Fit
 from app.work.jobs import Job, MapOutput, Outputs
 from solver.gl.device import Device
 

@@ -16,8 +16,8 @@ from app.ui.viewport import Rect
 from app.ui.widgets import Ui
 from app.ui.workspace import Workspace
 from app.work.export_process import FitProcess
-from app.work.fit_job import Fit, pairs_in
-from app.work.fitting import DURATION, EVALUATIONS
+from app.work.fit_job import pairs_in
+from app.work.fitting import DURATION, EVALUATIONS, Fit
 from app.work.handle_status import FIT
 from app.work.session import Session
 
@@ -28,7 +28,7 @@ class Fits:
     """The fit that is under way, if any: `fluidwarp fit` of the work's own handles, or of pairs in files.
 
     Attributes:
-        evaluations: see `fitted`.
+        evaluations: see `Fit`.
         process: that fits, while one does.
     """
 

@@ -6,7 +6,7 @@ import queue
 import threading
 from collections.abc import Callable
 
-from app.work.fit_job import Fit
+from app.work.fitting import Fit
 from app.work.jobs import Job
 from app.work.worker import Outcome, Reply, Status, Warned, Work, Worker
 

@@ -10,43 +10,16 @@ from pathlib import Path
 import numpy as np
 
 from app.errors import UserError
-from app.media.clip import Clip
 from app.media.files import check_kept, in_text, name_from, noticing, replacing, telling, writable
 from app.media.landmarks import Pairs, check_ending, read_pairs, write_pairs
-from app.media.opening import Opened, check_picture
+from app.media.opening import Opened
 from app.media.outlines import read_outlines
 from app.media.project import picture_names
-from app.model.picture import Picture
-from app.model.recipe import UNNAMED, Recipe
+from app.model.recipe import Recipe
 from app.progress import Progress
-from app.work.fitting import EVALUATIONS, Fitted, fitted
+from app.work.fitting import Fit, Fitted
 from app.work.tasks import opened
 from solver.gl.device import Device
-
-
-@dataclass(frozen=True)
-class Fit:
-    """What is fitted, in itself: see `fitted`. Stopped, it ends with the best so far."""
-
-    recipe: Recipe
-    picture: Picture
-    folder: Path
-    pairs: Pairs | None = None
-    evaluations: int = EVALUATIONS
-    local: float | None = None
-    clip: Clip | None = None
-    source: str = UNNAMED
-
-    @property
-    def label(self) -> str:
-        """What the user calls it."""
-        return "the fit"
-
-    def perform(self, device: Device, progress: Progress) -> Fitted:
-        """Do it. Raises `UserError`, and `Cancelled` if nothing has been found yet."""
-        check_picture(self.picture)
-        how = self.evaluations, self.local, self.clip, self.source
-        return fitted(device, self.recipe, self.picture, self.folder, self.pairs, progress, *how)
 
 
 def pairs_in(
@@ -78,7 +51,7 @@ class FitJob:
         output: the recipe that is written.
         arrived: where the points arrive, if that is written.
         image: the picture, instead of the recipe's own.
-        evaluations, local: see `fitted`.
+        evaluations, local: see `Fit`.
         max_pixels: larger pictures are refused.
     """
 

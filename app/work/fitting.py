@@ -18,6 +18,7 @@ from app.media.auxiliary import Pictures
 from app.media.clip import Clip
 from app.media.landmarks import Pairs
 from app.media.losses import few
+from app.media.opening import check_picture
 from app.model.handles import (
     ARRIVED,
     LARGEST_LEAD,
@@ -132,19 +133,9 @@ class Fitted:
         return f"{len(errors)} {self.noun}{several}, {met}; {shape}"
 
 
-def fitted(
-    device: Device,
-    recipe: Recipe,
-    picture: Picture,
-    folder: Path,
-    pairs: Pairs | None,
-    progress: Progress,
-    evaluations: int = EVALUATIONS,
-    local: float | None = None,
-    clip: Clip | None = None,
-    label: str = UNNAMED,
-) -> Fitted:
-    """The recipe with a handle for each pair, its values searched for the least work that reaches them without a fold.
+@dataclass(frozen=True)
+class Fit:
+    """A recipe with a handle for each pair, its values searched for the least work that reaches them without a fold.
 
     By COBYQA (Ragonneau and Zhang), a trust-region method without derivatives for bounds and constraints: on a coarse
     grid first with all handles alike, then the radius of each, then the duration of each; and with all alike again on
@@ -152,45 +143,64 @@ def fitted(
     What is told of the best so far, and returned, has been played on the recipe's own grid: where handles are in each
     other's way they halt elsewhere on a coarse one. The start is, and what each part of the search has found.
     Handles of an earlier fit are replaced. A budget ends it and no clock, so that the same is found again. If
-    `progress` says to stop, what was found since is played there too, and the best is returned.
+    the progress says to stop, what was found since is played there too, and the best is returned.
 
-    Args:
+    Attributes:
         folder: where the names of the recipe's other pictures start from.
         pairs: None are those of the recipe's own handles, which are replaced, and keep their numbers.
         evaluations: replays on the coarse grid.
         local: of all handles; None is 1 where there are curves, 0 of points, and the recipe's own keep theirs.
         clip: the one that the picture is the first frame of.
-        label: what the recipe is called.
-
-    Raises:
-        UserError: if no pair lies in the picture, or there are too many.
-        Cancelled: if it is stopped before anything has been found.
+        source: what the recipe is called.
     """
-    pictures = Pictures(picture, folder, clip, label)
-    aim = _aimed(device, recipe, pictures, pairs, progress)
-    if local is not None:
-        leads = (replace(lead, handle=lead.handle.model_copy(update={"local": local})) for lead in aim.leads)
-        aim = replace(aim, leads=tuple(leads))
-    search = _Search(device, aim, pictures, progress)
-    fine, count = max(evaluations // A_FINE_ONE, 1), len(search.numbers)
-    alike, each = _directions(count), np.eye(3 * count + 1)
-    parts = [(alike, 0.25), (each[:, :count], 0.15), (each[:, 2 * count : -1], 0.15)][: 3 if count <= ALONE else 1]
-    progress.total = evaluations + search.fine.cost * (fine + len(parts))
-    stopped = False
-    try:
-        for start in search.starts:  # soon there is something to stop with
-            search.trial(search.coarse, start)
-        search.trial(search.fine, search.coarse.best)
-        for number, (directions, reach) in enumerate(parts):
-            left = evaluations - search.coarse.replays
-            search.run(search.coarse, search.coarse.best, directions, reach, left // (len(parts) - number))
+
+    recipe: Recipe
+    picture: Picture
+    folder: Path
+    pairs: Pairs | None = None
+    evaluations: int = EVALUATIONS
+    local: float | None = None
+    clip: Clip | None = None
+    source: str = UNNAMED
+
+    @property
+    def label(self) -> str:
+        """What the user calls it."""
+        return "the fit"
+
+    def perform(self, device: Device, progress: Progress) -> Fitted:
+        """Do it.
+
+        Raises:
+            UserError: if no pair lies in the picture, or there are too many.
+            Cancelled: if it is stopped before anything has been found.
+        """
+        check_picture(self.picture)
+        pictures = Pictures(self.picture, self.folder, self.clip, self.source)
+        aim = _aimed(device, self.recipe, pictures, self.pairs, progress)
+        if self.local is not None:
+            leads = (replace(lead, handle=lead.handle.model_copy(update={"local": self.local})) for lead in aim.leads)
+            aim = replace(aim, leads=tuple(leads))
+        search = _Search(device, aim, pictures, progress)
+        fine, count = max(self.evaluations // A_FINE_ONE, 1), len(search.numbers)
+        alike, each = _directions(count), np.eye(3 * count + 1)
+        parts = [(alike, 0.25), (each[:, :count], 0.15), (each[:, 2 * count : -1], 0.15)][: 3 if count <= ALONE else 1]
+        progress.total = self.evaluations + search.fine.cost * (fine + len(parts))
+        stopped = False
+        try:
+            for start in search.starts:  # soon there is something to stop with
+                search.trial(search.coarse, start)
             search.trial(search.fine, search.coarse.best)
-        search.run(search.fine, search.fine.best, alike, 0.05, fine)
-    except Cancelled:
-        if search.coarse.found is None:
-            raise
-        stopped = True
-    return search.ended(stopped)
+            for number, (directions, reach) in enumerate(parts):
+                left = self.evaluations - search.coarse.replays
+                search.run(search.coarse, search.coarse.best, directions, reach, left // (len(parts) - number))
+                search.trial(search.fine, search.coarse.best)
+            search.run(search.fine, search.fine.best, alike, 0.05, fine)
+        except Cancelled:
+            if search.coarse.found is None:
+                raise
+            stopped = True
+        return search.ended(stopped)
 
 
 @dataclass(frozen=True)

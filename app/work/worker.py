@@ -17,7 +17,7 @@ from app.errors import Cancelled, UserError
 from app.model.recipe import Recipe
 from app.progress import GRACE, INTERRUPTED, Progress, abandon, deaf_children, interruptible
 from app.work.export import run
-from app.work.fit_job import Fit
+from app.work.fitting import Fit
 from app.work.jobs import Job
 from app.work.tasks import Piece
 from solver.gl.context import ContextError

@@ -24,7 +24,7 @@ from app.media.landmarks import Pairs
 from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.progress import Progress
-from app.work.fitting import EVALUATIONS, fitted
+from app.work.fitting import EVALUATIONS, Fit
 from app.work.replay import Replay
 from solver.gl.device import Device
 from solver.warp.inverse import ForwardMap
@@ -48,7 +48,8 @@ def main() -> None:
         for seed in range(FIRST, FIRST + arguments.cases):
             points, targets, _ = arrangement(seed, arguments.pairs, 0)
             pairs, began = np.stack([points, targets], axis=1), time.process_time()
-            found = fitted(device, Recipe(), picture, Path(), Pairs.points(pairs), Progress(), arguments.evaluations)
+            fit = Fit(Recipe(), picture, Path(), Pairs.points(pairs), arguments.evaluations)
+            found = fit.perform(device, Progress())
             spent = time.process_time() - began
             recipe = Recipe.parse(found.trial.recipe.text())
             replay = Replay(device, recipe, Pictures(picture), budget=0)

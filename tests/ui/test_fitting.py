@@ -24,7 +24,8 @@ from app.ui.events import Drop
 from app.ui.fitting import Fits
 from app.ui.widgets import Ui
 from app.work.export_process import FitProcess
-from app.work.fit_job import Fit, pairs_in
+from app.work.fit_job import pairs_in
+from app.work.fitting import Fit
 from app.work.worker import Outcome
 from solver.gl.device import Device
 from support.commands import Run

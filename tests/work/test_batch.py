@@ -33,7 +33,7 @@ from app.progress import INTERRUPTED, Progress
 from app.work import cluster, states, worker
 from app.work.apply_job import Application, MapSource
 from app.work.batch import run_batch
-from app.work.fit_job import Fit
+from app.work.fitting import Fit
 from app.work.jobs import Job, MapOutput, Outputs
 from app.work.replay import Replay
 from app.work.tasks import Edits, Task, named, spread

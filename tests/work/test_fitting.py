@@ -23,8 +23,8 @@ from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.progress import INTERRUPTED, Progress
 from app.work import fitting, worker
-from app.work.fit_job import Fit, FitJob
-from app.work.fitting import LEAST_DET, Fitted, Trial, fitted
+from app.work.fit_job import FitJob
+from app.work.fitting import LEAST_DET, Fit, Fitted, Trial
 from app.work.replay import Replay
 from app.work.worker import Outcome, perform
 from solver.gl.device import Device
@@ -45,7 +45,7 @@ def fit(
 ) -> Fitted:
     progress = Progress(**hearing)  # pyright: ignore[reportArgumentType]
     pairs = Pairs.points(pairs) if isinstance(pairs, np.ndarray) else pairs
-    return fitted(device, Recipe.parse(recipe), PICTURE, Path(), pairs, progress, evaluations)
+    return Fit(Recipe.parse(recipe), PICTURE, Path(), pairs, evaluations).perform(device, progress)
 
 
 def arrived(device: Device, recipe: Recipe, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
