@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-from imgui_bundle import imgui
+from imgui_bundle import imgui, imgui_ctx
 from imgui_bundle.imgui import ImVec2
 
 from app.errors import printable, shown
@@ -70,16 +70,15 @@ class Browser(Dialog):
         if entered and not self._go_to_typed():
             return False
         foot = ui.px(88 if self.writes else 48)
-        imgui.begin_child("files", ImVec2(0, -foot))
-        going: Path | None = None
-        done = False
-        for number, path in enumerate(self.inside):
-            imgui.push_id(number)
-            going, done = self._row(ui, path, going, done)
-            imgui.pop_id()
-        if not self.inside:
-            ui.dim(self._problem or "Nothing here that can be opened.")
-        imgui.end_child()
+        with imgui_ctx.begin_child("files", ImVec2(0, -foot)):
+            going: Path | None = None
+            done = False
+            for number, path in enumerate(self.inside):
+                imgui.push_id(number)
+                going, done = self._row(ui, path, going, done)
+                imgui.pop_id()
+            if not self.inside:
+                ui.dim(self._problem or "Nothing here that can be opened.")
         if going is not None:
             self.go(going)
         named = False

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from math import floor
 from pathlib import Path
 
-from imgui_bundle import imgui
+from imgui_bundle import imgui, imgui_ctx
 from imgui_bundle.imgui import ImVec2
 
 from app.errors import UserError
@@ -85,12 +85,9 @@ class Dialog(ABC):
         room = max(self._highest - imgui.get_cursor_pos_y() - beneath, ui.px(40))
         imgui.set_next_window_size_constraints(ImVec2(0, 0), ImVec2(float("inf"), min(room, ui.px(most))))
         flags = imgui.ChildFlags_.auto_resize_y | imgui.ChildFlags_.nav_flattened
-        imgui.begin_child("scrolled", ImVec2(0, 0), flags)
-        try:
+        with imgui_ctx.begin_child("scrolled", ImVec2(0, 0), flags):
             yield
-        finally:
             height, self._scrolls = self._scrolls, imgui.get_cursor_pos_y()
-            imgui.end_child()
         self._is_settled = self._scrolls == height  # it takes its height in the next frame
 
     def release(self) -> None:  # noqa: B027

@@ -16,7 +16,7 @@ from pathlib import Path
 from weakref import WeakKeyDictionary
 
 import moderngl
-from imgui_bundle import imgui
+from imgui_bundle import imgui, imgui_ctx
 from imgui_bundle.imgui import ImVec2
 
 from app.errors import UserError, printable
@@ -590,18 +590,16 @@ def under_way(
     if top > canvas.y + ui.px(16) and top + ui.px(60) > canvas.bottom:
         return False  # there is no room for both
     with ui.floating(name, middle, top, (0.5, 0)):
-        imgui.begin_group()
-        imgui.push_text_wrap_pos(imgui.get_cursor_pos_x() + width)
-        ui.text(words, size=14)
-        imgui.pop_text_wrap_pos()
-        corner = imgui.get_cursor_screen_pos()
-        lines = imgui.get_window_draw_list()
-        high = ImVec2(corner.x + width, corner.y + ui.px(5))
-        lines.add_rect_filled(corner, high, packed(ui.palette.pressed), ui.px(3))
-        done = ImVec2(corner.x + max(width * part, ui.px(5)), high.y)
-        lines.add_rect_filled(corner, done, packed(ui.palette.accent), ui.px(3))
-        imgui.dummy(ImVec2(width, ui.px(8)))
-        imgui.end_group()
+        with imgui_ctx.begin_group():
+            with imgui_ctx.push_text_wrap_pos(imgui.get_cursor_pos_x() + width):
+                ui.text(words, size=14)
+            corner = imgui.get_cursor_screen_pos()
+            lines = imgui.get_window_draw_list()
+            high = ImVec2(corner.x + width, corner.y + ui.px(5))
+            lines.add_rect_filled(corner, high, packed(ui.palette.pressed), ui.px(3))
+            done = ImVec2(corner.x + max(width * part, ui.px(5)), high.y)
+            lines.add_rect_filled(corner, done, packed(ui.palette.accent), ui.px(3))
+            imgui.dummy(ImVec2(width, ui.px(8)))
         if not button:
             return False
         imgui.same_line(0, ui.px(16))

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from imgui_bundle import imgui
+from imgui_bundle import imgui, imgui_ctx
 
 from app.errors import UserError
 from app.media import project as projects
@@ -290,10 +290,9 @@ class Files:
         with ui.floating(
             "loading", middle, ui.free_below(middle - half, middle + half, canvas.y + ui.px(16)), (0.5, 0)
         ):
-            imgui.begin_group()
-            ui.text(f"Opening {self._loading.name} ...", size=14)
-            ui.dim("The picture below is a sample." if is_sample else "You can go on meanwhile.")
-            imgui.end_group()
+            with imgui_ctx.begin_group():
+                ui.text(f"Opening {self._loading.name} ...", size=14)
+                ui.dim("The picture below is a sample." if is_sample else "You can go on meanwhile.")
             imgui.same_line(0, ui.px(16))
             if ui.button("Cancel##loading", height=30):
                 self.give_up_loading()

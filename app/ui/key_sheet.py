@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from imgui_bundle import imgui
+from imgui_bundle import imgui, imgui_ctx
 from imgui_bundle.imgui import ImVec2
 
 from app.ui.dialogs import Dialog, beside
@@ -61,16 +61,15 @@ class KeySheet(Dialog):
         groups: dict[str, list[Keyed]] = {}
         for action in self._keys.actions.values():
             groups.setdefault(action.group, []).append(action)
-        imgui.begin_child("keys", ImVec2(0, -ui.px(48)))
-        across = min(max(int(imgui.get_content_region_avail().x / ui.px(230)), 1), len(COLUMNS))
-        if imgui.begin_table("sheet", across, imgui.TableFlags_.sizing_stretch_same):
-            imgui.table_next_row()
-            for column in COLUMNS:
-                imgui.table_next_column()
-                for group in column:
-                    self._group(ui, group, groups.get(group, []))
-            imgui.end_table()
-        imgui.end_child()
+        with imgui_ctx.begin_child("keys", ImVec2(0, -ui.px(48))):
+            across = min(max(int(imgui.get_content_region_avail().x / ui.px(230)), 1), len(COLUMNS))
+            if imgui.begin_table("sheet", across, imgui.TableFlags_.sizing_stretch_same):
+                imgui.table_next_row()
+                for column in COLUMNS:
+                    imgui.table_next_column()
+                    for group in column:
+                        self._group(ui, group, groups.get(group, []))
+                imgui.end_table()
         imgui.dummy(ImVec2(0, 0))
         return self._foot(ui)
 
@@ -101,14 +100,13 @@ class KeySheet(Dialog):
 
     def _group(self, ui: Ui, name: str, actions: list[Keyed]) -> None:
         ui.text(name, ui.palette.accent, 13, bold=True)
-        imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(ui.px(8), 0))
-        for action in actions:
-            if self._row(ui, action.label, keys_shown(self._keys.of(action.name)), action):
-                self.choose(action)
-        if name == "Mouse":
-            for label, keys in MOUSE:
-                self._row(ui, label, keys)
-        imgui.pop_style_var()
+        with imgui_ctx.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(ui.px(8), 0)):
+            for action in actions:
+                if self._row(ui, action.label, keys_shown(self._keys.of(action.name)), action):
+                    self.choose(action)
+            if name == "Mouse":
+                for label, keys in MOUSE:
+                    self._row(ui, label, keys)
         imgui.dummy(ImVec2(0, ui.px(2)))
 
     def _row(self, ui: Ui, label: str, keys: str, action: Keyed | None = None) -> bool:
@@ -123,12 +121,11 @@ class KeySheet(Dialog):
             lit |= imgui.is_item_hovered() or (imgui.is_item_focused() and imgui.get_io().nav_visible)
         if lit:
             lines.add_rect_filled(corner - edge, corner + size, packed(ui.palette.hover), ui.px(4))
-        imgui.push_font(ui.fonts.regular, 13.5)
-        keys = "Press a key" if action is not None and action is self._wanted else keys
-        width = imgui.calc_text_size(keys).x
-        right, down = corner.x + size.x - ui.px(20), corner.y + ui.px(1.5)
-        ink = ui.palette.accent if action is not None and action is self._wanted else ui.palette.dim
-        lines.add_text(ImVec2(corner.x, down), packed(ui.palette.text), label)
-        lines.add_text(ImVec2(right - width, down), packed(ink), keys)
-        imgui.pop_font()
+        with imgui_ctx.push_font(ui.fonts.regular, 13.5):
+            keys = "Press a key" if action is not None and action is self._wanted else keys
+            width = imgui.calc_text_size(keys).x
+            right, down = corner.x + size.x - ui.px(20), corner.y + ui.px(1.5)
+            ink = ui.palette.accent if action is not None and action is self._wanted else ui.palette.dim
+            lines.add_text(ImVec2(corner.x, down), packed(ui.palette.text), label)
+            lines.add_text(ImVec2(right - width, down), packed(ink), keys)
         return clicked

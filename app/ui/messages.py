@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from imgui_bundle import imgui
+from imgui_bundle import imgui, imgui_ctx
 from imgui_bundle.imgui import ImVec2
 
 from app.errors import printable
@@ -111,15 +111,13 @@ class Messages:
         words = fitting(message.text, room, height)
         text = imgui.calc_text_size(words, wrap_width=room)
         imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + ui.px(28))
-        imgui.begin_group()
-        imgui.push_text_wrap_pos(imgui.get_cursor_pos_x() + min(room, text.x + 2))
-        ui.text(words, size=14)
-        if words != message.text:
-            ui.tooltip("All of it", more=message.text)
-        if others and text.y + ui.px(20) <= height:
-            ui.dim(f"{others} more", 12)
-        imgui.pop_text_wrap_pos()
-        imgui.end_group()
+        end = imgui.get_cursor_pos_x() + min(room, text.x + 2)
+        with imgui_ctx.begin_group(), imgui_ctx.push_text_wrap_pos(end):
+            ui.text(words, size=14)
+            if words != message.text:
+                ui.tooltip("All of it", more=message.text)
+            if others and text.y + ui.px(20) <= height:
+                ui.dim(f"{others} more", 12)
         imgui.same_line(0, ui.px(12))
         imgui.set_cursor_pos_y(imgui.get_cursor_pos_y() - ui.px(2))
         if ui.icon_button("close", "close", size=22, icon_size=13):

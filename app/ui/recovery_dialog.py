@@ -7,7 +7,7 @@ from collections.abc import Callable
 from datetime import date, datetime
 from pathlib import Path
 
-from imgui_bundle import imgui
+from imgui_bundle import imgui, imgui_ctx
 from imgui_bundle.imgui import ImVec2
 
 from app.ui.clock import TWICE
@@ -134,14 +134,12 @@ class Offer(Dialog):
         is_narrow = imgui.calc_text_size(what).x > right - ui.px(224)
         across = ui.px(100 if is_narrow else 208)
         room = right - across - ui.px(16)
-        imgui.begin_group()
-        imgui.push_font(ui.fonts.bold, 15)
-        name = _shortened(found.origin.name, room, from_start=True)
-        imgui.pop_font()
-        ui.text(name, size=15, bold=True)
-        ui.dim(_shortened(what, room, from_start=True))
-        ui.dim(_shortened(str(found.file), room))
-        imgui.end_group()
+        with imgui_ctx.begin_group():
+            with imgui_ctx.push_font(ui.fonts.bold, 15):
+                name = _shortened(found.origin.name, room, from_start=True)
+            ui.text(name, size=15, bold=True)
+            ui.dim(_shortened(what, room, from_start=True))
+            ui.dim(_shortened(str(found.file), room))
         imgui.set_cursor_pos(ImVec2(right - across, top + ui.px(2 if is_narrow else 14)))
         discard = ui.button("Really?" if found is self._doubted else "Discard", width=100)
         if is_narrow:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from math import isfinite, log
 from typing import Any
 
-from imgui_bundle import imgui
+from imgui_bundle import imgui, imgui_ctx
 from imgui_bundle.imgui import ImVec2, internal
 
 from app.errors import printable
@@ -92,12 +92,9 @@ class Ui:
         imgui.set_next_window_size(ImVec2(rect.width, rect.height))
         imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(self.px(padding[0]), self.px(padding[1])))
         imgui.push_style_var(imgui.StyleVar_.window_rounding, 0.0)
-        imgui.begin(name, None, ON_GROUND | flags)
-        imgui.pop_style_var(2)
-        try:
+        with imgui_ctx.begin(name, None, ON_GROUND | flags):
+            imgui.pop_style_var(2)
             yield
-        finally:
-            imgui.end()
 
     @contextmanager
     def floating(
@@ -122,16 +119,13 @@ class Ui:
         if tallest:
             imgui.set_next_window_size_constraints(ImVec2(0, 0), ImVec2(imgui.FLT_MAX, max(tallest, 1.0)))
             flags &= ~int(imgui.WindowFlags_.no_scrollbar)
-        imgui.begin(name, None, flags)
-        imgui.pop_style_var(2)
-        try:
+        with imgui_ctx.begin(name, None, flags):
+            imgui.pop_style_var(2)
             yield
             if clicked:
                 self.cover()
             else:
                 self.floating_over.append(self._window())
-        finally:
-            imgui.end()
 
     def cover(self) -> None:
         """Take note that the window being drawn lies on the canvas."""
@@ -177,9 +171,8 @@ class Ui:
         self.text(text, self.palette.dim, size)
 
     def wrapped(self, text: str, colour: Colour | None = None, size: float = 0.0) -> None:
-        imgui.push_text_wrap_pos(0.0)
-        self.text(text, colour, size)
-        imgui.pop_text_wrap_pos()
+        with imgui_ctx.push_text_wrap_pos(0.0):
+            self.text(text, colour, size)
 
     def tooltip(self, title: str, key: str = "", more: str = "", at_once: bool = False, above: bool = False) -> None:
         """What the last item is, shown when the pointer rests on it; `at_once`: its name, beside it, on the way there.
@@ -203,9 +196,8 @@ class Ui:
                 imgui.same_line(0, self.px(12))
                 self.text(keys, self.palette.accent, 13)
             if more and rests:
-                imgui.push_text_wrap_pos(self.px(280))
-                self.dim(more)
-                imgui.pop_text_wrap_pos()
+                with imgui_ctx.push_text_wrap_pos(self.px(280)):
+                    self.dim(more)
             imgui.end_tooltip()
         imgui.pop_style_var(2)
 
@@ -252,44 +244,41 @@ class Ui:
         at = (side - inner) / 2
         icons.draw(draw, icon, corner.x + at, corner.y + at, inner, ink)
         if width:
-            imgui.push_font(self.fonts.regular, 13.5)
-            draw.add_text(ImVec2(corner.x + side, corner.y + (side - imgui.get_font_size()) / 2), ink, title)
-            imgui.pop_font()
+            with imgui_ctx.push_font(self.fonts.regular, 13.5):
+                draw.add_text(ImVec2(corner.x + side, corner.y + (side - imgui.get_font_size()) / 2), ink, title)
         return clicked
 
     def button(self, label: str, primary: bool = False, width: float = 0.0, icon: str = "", height: float = 32) -> bool:
         """A button with words; the primary one is what most people want next."""
         palette, words = self.palette, label.split("##")[0]
-        imgui.push_font(self.fonts.bold if primary else self.fonts.regular, 14.0)
-        text = imgui.calc_text_size(words)
-        room = self.px(22) if icon else 0.0
-        size = ImVec2(self.px(width) if width > 0 else text.x + room + self.px(28), self.px(height))
-        if width < 0:
-            size.x = imgui.get_content_region_avail().x
-        corner = imgui.get_cursor_screen_pos()
-        clicked = imgui.invisible_button(label, size)
-        hovered, held, focused = imgui.is_item_hovered(), imgui.is_item_active(), imgui.is_item_focused()
-        ground = (
-            palette.accent if primary else palette.pressed if held else palette.hover if hovered else palette.raised
-        )
-        draw = imgui.get_window_draw_list()
-        alpha = imgui.get_style().alpha * (0.85 if primary and (hovered or held) else 1.0)
-        draw.add_rect_filled(corner, corner + size, packed(ground, alpha), self.px(6))
-        if focused and imgui.get_io().nav_visible:
-            draw.add_rect(corner, corner + size, packed(palette.text), self.px(6), self.px(1.5))
-        ink = palette.on_accent if primary else palette.text
-        x = corner.x + (size.x - text.x - room) / 2
-        if icon:
-            icons.draw(draw, icon, x, corner.y + (size.y - self.px(16)) / 2, self.px(16), packed(ink, alpha))
-        draw.add_text(ImVec2(x + room, corner.y + (size.y - text.y) / 2), packed(ink, alpha), words)
-        imgui.pop_font()
+        with imgui_ctx.push_font(self.fonts.bold if primary else self.fonts.regular, 14.0):
+            text = imgui.calc_text_size(words)
+            room = self.px(22) if icon else 0.0
+            size = ImVec2(self.px(width) if width > 0 else text.x + room + self.px(28), self.px(height))
+            if width < 0:
+                size.x = imgui.get_content_region_avail().x
+            corner = imgui.get_cursor_screen_pos()
+            clicked = imgui.invisible_button(label, size)
+            hovered, held, focused = imgui.is_item_hovered(), imgui.is_item_active(), imgui.is_item_focused()
+            ground = (
+                palette.accent if primary else palette.pressed if held else palette.hover if hovered else palette.raised
+            )
+            draw = imgui.get_window_draw_list()
+            alpha = imgui.get_style().alpha * (0.85 if primary and (hovered or held) else 1.0)
+            draw.add_rect_filled(corner, corner + size, packed(ground, alpha), self.px(6))
+            if focused and imgui.get_io().nav_visible:
+                draw.add_rect(corner, corner + size, packed(palette.text), self.px(6), self.px(1.5))
+            ink = palette.on_accent if primary else palette.text
+            x = corner.x + (size.x - text.x - room) / 2
+            if icon:
+                icons.draw(draw, icon, x, corner.y + (size.y - self.px(16)) / 2, self.px(16), packed(ink, alpha))
+            draw.add_text(ImVec2(x + room, corner.y + (size.y - text.y) / 2), packed(ink, alpha), words)
         return clicked
 
     def segmented_width(self, choices: Sequence[str]) -> float:
         """What `segmented` takes if no width is asked for."""
-        imgui.push_font(self.fonts.regular, 13.5)
-        width = sum(imgui.calc_text_size(choice).x + self.px(20) for choice in choices)
-        imgui.pop_font()
+        with imgui_ctx.push_font(self.fonts.regular, 13.5):
+            width = sum(imgui.calc_text_size(choice).x + self.px(20) for choice in choices)
         return width
 
     def segmented(
@@ -300,34 +289,32 @@ class Ui:
         `about`: of each, told above it, where it covers nothing of what the choice changes.
         """
         palette, draw = self.palette, imgui.get_window_draw_list()
-        imgui.push_font(self.fonts.regular, 13.5)
-        widths = [imgui.calc_text_size(choice).x + self.px(20) for choice in choices]
-        if width:
-            whole = imgui.get_content_region_avail().x if width < 0 else self.px(width)
-            widths = [whole / len(choices)] * len(choices)
-        corner, height = imgui.get_cursor_screen_pos(), self.px(28)
-        draw.add_rect_filled(corner, corner + ImVec2(sum(widths), height), packed(palette.raised), self.px(6))
-        chosen, x = index, corner.x
-        imgui.begin_group()
-        for number, (choice, across) in enumerate(zip(choices, widths, strict=True)):
-            if number:
-                imgui.same_line(0, 0)
-            if imgui.invisible_button(f"{name}{number}", ImVec2(across, height)):
-                chosen = number
-            hovered = imgui.is_item_hovered()
-            if about:
-                self.tooltip(choice, more=about[number], above=True)
-            box = self.px(2)
-            if number == index:
-                low, high = ImVec2(x + box, corner.y + box), ImVec2(x + across - box, corner.y + height - box)
-                draw.add_rect_filled(low, high, packed(palette.pressed), self.px(5))
-            size = imgui.calc_text_size(choice)
-            ink = palette.text if number == index or hovered else palette.dim
-            at = ImVec2(x + (across - size.x) / 2, corner.y + (height - size.y) / 2)
-            draw.add_text(at, packed(ink, imgui.get_style().alpha), choice)
-            x += across
-        imgui.end_group()
-        imgui.pop_font()
+        with imgui_ctx.push_font(self.fonts.regular, 13.5):
+            widths = [imgui.calc_text_size(choice).x + self.px(20) for choice in choices]
+            if width:
+                whole = imgui.get_content_region_avail().x if width < 0 else self.px(width)
+                widths = [whole / len(choices)] * len(choices)
+            corner, height = imgui.get_cursor_screen_pos(), self.px(28)
+            draw.add_rect_filled(corner, corner + ImVec2(sum(widths), height), packed(palette.raised), self.px(6))
+            chosen, x = index, corner.x
+            with imgui_ctx.begin_group():
+                for number, (choice, across) in enumerate(zip(choices, widths, strict=True)):
+                    if number:
+                        imgui.same_line(0, 0)
+                    if imgui.invisible_button(f"{name}{number}", ImVec2(across, height)):
+                        chosen = number
+                    hovered = imgui.is_item_hovered()
+                    if about:
+                        self.tooltip(choice, more=about[number], above=True)
+                    box = self.px(2)
+                    if number == index:
+                        low, high = ImVec2(x + box, corner.y + box), ImVec2(x + across - box, corner.y + height - box)
+                        draw.add_rect_filled(low, high, packed(palette.pressed), self.px(5))
+                    size = imgui.calc_text_size(choice)
+                    ink = palette.text if number == index or hovered else palette.dim
+                    at = ImVec2(x + (across - size.x) / 2, corner.y + (height - size.y) / 2)
+                    draw.add_text(at, packed(ink, imgui.get_style().alpha), choice)
+                    x += across
         return chosen
 
     def check(self, label: str, value: bool, key: str = "") -> bool:
@@ -337,16 +324,15 @@ class Ui:
         if imgui.invisible_button(label, ImVec2(width, height)):
             value = not value
         hovered = imgui.is_item_hovered()
-        imgui.push_font(self.fonts.regular, 14.0)
-        words = label.split("##")[0]
-        text = imgui.calc_text_size(words)
-        ink = palette.text if hovered or value else palette.dim
-        y = corner.y + (height - text.y) / 2
-        draw.add_text(ImVec2(corner.x, y), packed(ink), words)
-        if key:
-            at = ImVec2(corner.x + text.x + self.px(8), y)
-            draw.add_text(at, packed(palette.faint), self.shown(key))
-        imgui.pop_font()
+        with imgui_ctx.push_font(self.fonts.regular, 14.0):
+            words = label.split("##")[0]
+            text = imgui.calc_text_size(words)
+            ink = palette.text if hovered or value else palette.dim
+            y = corner.y + (height - text.y) / 2
+            draw.add_text(ImVec2(corner.x, y), packed(ink), words)
+            if key:
+                at = ImVec2(corner.x + text.x + self.px(8), y)
+                draw.add_text(at, packed(palette.faint), self.shown(key))
         track, thick = self.px(26), self.px(15)
         x0, y0 = corner.x + width - track, corner.y + (height - thick) / 2
         ground = palette.accent if value else palette.pressed
@@ -467,9 +453,8 @@ class Ui:
         ink = palette.text if imgui.is_item_hovered() else palette.dim
         icon = "chevron_down" if is_open else "chevron_right"
         icons.draw(draw, icon, corner.x - self.px(2), corner.y + self.px(7), self.px(14), packed(ink), 2.2)
-        imgui.push_font(self.fonts.bold, 13.0)
-        draw.add_text(ImVec2(corner.x + self.px(17), corner.y + self.px(7)), packed(ink), label)
-        imgui.pop_font()
+        with imgui_ctx.push_font(self.fonts.bold, 13.0):
+            draw.add_text(ImVec2(corner.x + self.px(17), corner.y + self.px(7)), packed(ink), label)
         return is_open
 
     def rule(self, low: ImVec2, high: ImVec2) -> None:

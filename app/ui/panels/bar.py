@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from imgui_bundle import imgui
+from imgui_bundle import imgui, imgui_ctx
 from imgui_bundle.imgui import ImVec2
 
 from app.errors import printable
@@ -87,19 +87,17 @@ def draw(
 def _title(ui: Ui, tool: Tool, room: float) -> None:
     """The tool's name, if there is room for it, and what a tool without a brush does."""
     start = imgui.get_cursor_pos_x()
-    imgui.push_font(ui.fonts.bold, 0)
-    width = imgui.calc_text_size(tool.label).x
-    imgui.pop_font()
-    imgui.begin_group()
-    if start + width <= room:
-        imgui.set_cursor_pos_y(imgui.get_cursor_pos_y() + ui.px(8.5))
-        ui.text(tool.label, bold=True)
-        start += width + ui.px(12)
-        if tool.gesture is None and start + imgui.calc_text_size(tool.hint).x <= room:
-            imgui.same_line(0, ui.px(12))
-            imgui.set_cursor_pos_y(imgui.get_cursor_pos_y() + ui.px(9))
-            ui.dim(tool.hint, 14)
-    imgui.end_group()
+    with imgui_ctx.push_font(ui.fonts.bold, 0):
+        width = imgui.calc_text_size(tool.label).x
+    with imgui_ctx.begin_group():
+        if start + width <= room:
+            imgui.set_cursor_pos_y(imgui.get_cursor_pos_y() + ui.px(8.5))
+            ui.text(tool.label, bold=True)
+            start += width + ui.px(12)
+            if tool.gesture is None and start + imgui.calc_text_size(tool.hint).x <= room:
+                imgui.same_line(0, ui.px(12))
+                imgui.set_cursor_pos_y(imgui.get_cursor_pos_y() + ui.px(9))
+                ui.dim(tool.hint, 14)
 
 
 def _brush(ui: Ui, layout: Layout, workspace: Workspace, state: EditorState, likes: Preferences, room: float) -> None:
@@ -145,29 +143,27 @@ def _more(ui: Ui, layout: Layout, state: EditorState, likes: Preferences, parts:
     left = max(min(low.x, display.x - ui.px(BRUSHES_WIDTH + 24 + 8)), 0.0)
     imgui.set_next_window_pos(ImVec2(left, layout.bar.height))
     imgui.set_next_window_size_constraints(ImVec2(0, 0), ImVec2(display.x, display.y - layout.bar.height - ui.px(8)))
-    imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(ui.px(12), ui.px(12)))
-    if imgui.begin_popup("more of the brush"):
-        for draw in parts:
-            draw(BRUSHES_WIDTH)
-        if state.tool_name != "handle":
-            slid = ui.slider(
-                "stabiliser", "Stabiliser", state.stabiliser, 0.0, LONGEST_STRING, POINTS, 0.0, width=BRUSHES_WIDTH,
-                title="Stabiliser",
-                more="How far behind the pointer the brush follows, so that a shaky hand draws smoothly. "
-                "It catches up when you let go.",
-            )  # fmt: skip
-            state.stabiliser = slid.value
-        brushes.draw(ui, state, likes, BRUSHES_WIDTH)
-        imgui.end_popup()
-    imgui.pop_style_var()
+    with imgui_ctx.push_style_var(imgui.StyleVar_.window_padding, ImVec2(ui.px(12), ui.px(12))):
+        if imgui.begin_popup("more of the brush"):
+            for draw in parts:
+                draw(BRUSHES_WIDTH)
+            if state.tool_name != "handle":
+                slid = ui.slider(
+                    "stabiliser", "Stabiliser", state.stabiliser, 0.0, LONGEST_STRING, POINTS, 0.0, width=BRUSHES_WIDTH,
+                    title="Stabiliser",
+                    more="How far behind the pointer the brush follows, so that a shaky hand draws smoothly. "
+                    "It catches up when you let go.",
+                )  # fmt: skip
+                state.stabiliser = slid.value
+            brushes.draw(ui, state, likes, BRUSHES_WIDTH)
+            imgui.end_popup()
 
 
 def _directions(ui: Ui, state: EditorState, width: float) -> None:
     tool = state.tool
     assert tool.directions is not None
-    imgui.begin_group()
-    state.opposite[tool.name] = bool(ui.segmented("direction", tool.directions, int(state.is_opposite)))
-    imgui.end_group()
+    with imgui_ctx.begin_group():
+        state.opposite[tool.name] = bool(ui.segmented("direction", tool.directions, int(state.is_opposite)))
     ui.tooltip("Direction", f"shift+{tool.key}", "Hold Alt for the other one.")
 
 

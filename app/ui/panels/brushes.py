@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from imgui_bundle import imgui
+from imgui_bundle import imgui, imgui_ctx
 from imgui_bundle.imgui import ImVec2
 
 from app.ui.editor_state import EditorState, presets
@@ -30,11 +30,10 @@ def draw(ui: Ui, state: EditorState, likes: Preferences, width: float) -> None:
             ground = ui.palette.accent_soft if is_on else ui.palette.hover
             lines.add_rect_filled(corner, corner + size, packed(ground), ui.px(5))
         _tip(ui, lines, corner + ImVec2(ui.px(14), ui.px(ROW / 2)), preset.radius, preset.hardness, preset.strength)
-        imgui.push_font(ui.fonts.regular, 14.0)
-        lines.push_clip_rect(corner, corner + ImVec2(width - ui.px(ROW), ui.px(ROW)), True)
-        lines.add_text(corner + ImVec2(ui.px(32), ui.px(5)), packed(ui.palette.text), preset.name)
-        lines.pop_clip_rect()
-        imgui.pop_font()
+        with imgui_ctx.push_font(ui.fonts.regular, 14.0):
+            lines.push_clip_rect(corner, corner + ImVec2(width - ui.px(ROW), ui.px(ROW)), True)
+            lines.add_text(corner + ImVec2(ui.px(32), ui.px(5)), packed(ui.palette.text), preset.name)
+            lines.pop_clip_rect()
         if is_own:
             imgui.same_line(0, 0)
             if ui.icon_button("delete", "close", f"Delete {preset.name}", size=ROW, icon_size=13):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from imgui_bundle import imgui
+from imgui_bundle import imgui, imgui_ctx
 from imgui_bundle.imgui import ImVec2
 
 from app.model.recipe import Recipe
@@ -84,11 +84,10 @@ def _zoom(ui: Ui, workspace: Workspace, do: Do) -> None:
         if imgui.invisible_button("percent", ImVec2(width, ui.px(24))):
             do("actual")
         ui.tooltip("To 100 %", "ctrl+1")
-        imgui.push_font(ui.fonts.regular, 13.0)
-        size = imgui.calc_text_size(label)
-        at = ImVec2(corner.x + (width - size.x) / 2, corner.y + (ui.px(24) - size.y) / 2)
-        imgui.get_window_draw_list().add_text(at, packed(ui.palette.text), label)
-        imgui.pop_font()
+        with imgui_ctx.push_font(ui.fonts.regular, 13.0):
+            size = imgui.calc_text_size(label)
+            at = ImVec2(corner.x + (width - size.x) / 2, corner.y + (ui.px(24) - size.y) / 2)
+            imgui.get_window_draw_list().add_text(at, packed(ui.palette.text), label)
         imgui.same_line(0, ui.px(2))
         if ui.icon_button("in", "plus", "Zoom in", "+", size=24, icon_size=14):
             do("zoom_in")
@@ -126,9 +125,8 @@ def _how(ui: Ui, canvas: Rect, words: str) -> None:
 def _hint(ui: Ui, canvas: Rect, hint: str, preferences: Preferences) -> None:
     """What the tool in hand does, if there is room for it; until something has been painted."""
     words = f"{hint}."
-    imgui.push_font(ui.fonts.bold, 14.0)
-    width = imgui.calc_text_size(words).x + ui.px(BESIDE)
-    imgui.pop_font()
+    with imgui_ctx.push_font(ui.fonts.bold, 14.0):
+        width = imgui.calc_text_size(words).x + ui.px(BESIDE)
     if canvas.width < width:
         return
     # Beside the zoom, or above it.

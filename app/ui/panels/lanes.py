@@ -6,7 +6,7 @@ from bisect import bisect_right
 from math import ceil, floor, inf
 from typing import NamedTuple
 
-from imgui_bundle import imgui
+from imgui_bundle import imgui, imgui_ctx
 from imgui_bundle.imgui import ImVec2
 
 from app.model.bars import KINDS, Actor, Bar, Which, bar_of, one_of, several_of
@@ -72,11 +72,10 @@ def draw(ui: Ui, rect: Rect, session: Session, state: EditorState, do: Do) -> No
         bar = imgui.get_style().scrollbar_size
         x0 = rect.x + ui.px(12)
         scale = Scale(x0, max(rect.right - ui.px(14) - bar, x0 + 1.0), *lanes.span(session.length))
-        imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(0, 0))
-        if rect.height > ui.px(LOW):
-            _ruler(ui, session, scale)
-        let_go = _bars(ui, session, state, scale)
-        imgui.pop_style_var()
+        with imgui_ctx.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(0, 0)):
+            if rect.height > ui.px(LOW):
+                _ruler(ui, session, scale)
+            let_go = _bars(ui, session, state, scale)
     if let_go:
         lanes.release(session)
 
@@ -121,10 +120,9 @@ def _head(ui: Ui, session: Session, state: EditorState, do: Do) -> None:
 
 
 def _words(ui: Ui, words: str, corner: ImVec2, room: float) -> None:
-    imgui.push_font(ui.fonts.regular, 13.5)
-    line = fitting(words, room, imgui.get_text_line_height())
-    imgui.get_window_draw_list().add_text(corner + ImVec2(0, ui.px(4)), packed(ui.palette.dim), line)
-    imgui.pop_font()
+    with imgui_ctx.push_font(ui.fonts.regular, 13.5):
+        line = fitting(words, room, imgui.get_text_line_height())
+        imgui.get_window_draw_list().add_text(corner + ImVec2(0, ui.px(4)), packed(ui.palette.dim), line)
     if line != words:
         imgui.dummy(ImVec2(room, ui.px(HEAD - 4)))
         ui.tooltip("All of it", more=words)
@@ -173,14 +171,13 @@ def _ruler(ui: Ui, session: Session, scale: Scale) -> None:
         ui.tooltip("The recording", more="Drag to move through it. Ctrl and the wheel zoom.")
     draw, palette = imgui.get_window_draw_list(), ui.palette
     step = next((step for step in STEPS if step * scale.a_tick / dt >= ui.px(56)), STEPS[-1])
-    imgui.push_font(ui.fonts.regular, 11.5)
-    for number in range(ceil(scale.start * dt / step - 1e-6), floor(scale.stop * dt / step + 1e-6) + 1):
-        x = scale.across(number * step / dt)
-        words = f"{number * step:g} s"
-        ui.rule(ImVec2(x, corner.y + height - ui.px(5)), ImVec2(x + ui.px(1), corner.y + height))
-        if x + imgui.calc_text_size(words).x + ui.px(4) < x1 + ui.px(14):
-            draw.add_text(ImVec2(x + ui.px(3), corner.y), packed(palette.faint), words)
-    imgui.pop_font()
+    with imgui_ctx.push_font(ui.fonts.regular, 11.5):
+        for number in range(ceil(scale.start * dt / step - 1e-6), floor(scale.stop * dt / step + 1e-6) + 1):
+            x = scale.across(number * step / dt)
+            words = f"{number * step:g} s"
+            ui.rule(ImVec2(x, corner.y + height - ui.px(5)), ImVec2(x + ui.px(1), corner.y + height))
+            if x + imgui.calc_text_size(words).x + ui.px(4) < x1 + ui.px(14):
+                draw.add_text(ImVec2(x + ui.px(3), corner.y), packed(palette.faint), words)
     ui.rule(ImVec2(corner.x, corner.y + height - ui.px(1)), ImVec2(x1, corner.y + height))
 
 
@@ -188,34 +185,33 @@ def _bars(ui: Ui, session: Session, state: EditorState, scale: Scale) -> bool:
     """The bars; True if the pointer has let go of them."""
     lanes = state.lanes
     packed_lanes = lanes.packed(session.recipe, session.end, ui.px(NARROWEST) / scale.a_tick)
-    imgui.begin_child("rows", ImVec2(0, 0), 0, imgui.WindowFlags_.no_background)
-    corner, row = imgui.get_cursor_screen_pos(), ui.px(ROW + GAP)
-    room = imgui.get_content_region_avail().y
-    height = max(len(packed_lanes) * row + ui.px(GAP), room)
-    imgui.invisible_button("bars", ImVec2(max(imgui.get_content_region_avail().x, 1.0), height))
-    let_go = _point(ui, session, state, scale)
-    draw = imgui.get_window_draw_list()
-    top = imgui.get_window_pos().y
-    lanes.drawn.clear()
-    first = max(floor((top - corner.y) / row), 0)
-    last = ceil((top + imgui.get_window_height() - corner.y) / row)
-    for number in range(first, min(last, len(packed_lanes))):
-        lane = packed_lanes[number]
-        y = corner.y + ui.px(GAP) + number * row
-        at = max(bisect_right(lane, scale.start, key=lambda bar: bar.start) - 1, 0)
-        for bar in lane[at:]:
-            if bar.start > scale.stop:
-                break
-            _bar(ui, session, state, bar, y, scale)
-    now = scale.across(session.moment)
-    if scale.x0 <= now <= scale.x1 and session.length:
-        low, high = ImVec2(now, top), ImVec2(now + ui.px(1.5), top + imgui.get_window_height())
-        draw.add_rect_filled(low, high, packed(ui.palette.text))
-    if lanes.box is not None:
-        begun, here = ImVec2(*lanes.box[:2]), imgui.get_mouse_pos()
-        draw.add_rect_filled(begun, here, packed(ui.palette.text, 0.12))
-        draw.add_rect(begun, here, packed(ui.palette.text, 0.6))
-    imgui.end_child()
+    with imgui_ctx.begin_child("rows", ImVec2(0, 0), 0, imgui.WindowFlags_.no_background):
+        corner, row = imgui.get_cursor_screen_pos(), ui.px(ROW + GAP)
+        room = imgui.get_content_region_avail().y
+        height = max(len(packed_lanes) * row + ui.px(GAP), room)
+        imgui.invisible_button("bars", ImVec2(max(imgui.get_content_region_avail().x, 1.0), height))
+        let_go = _point(ui, session, state, scale)
+        draw = imgui.get_window_draw_list()
+        top = imgui.get_window_pos().y
+        lanes.drawn.clear()
+        first = max(floor((top - corner.y) / row), 0)
+        last = ceil((top + imgui.get_window_height() - corner.y) / row)
+        for number in range(first, min(last, len(packed_lanes))):
+            lane = packed_lanes[number]
+            y = corner.y + ui.px(GAP) + number * row
+            at = max(bisect_right(lane, scale.start, key=lambda bar: bar.start) - 1, 0)
+            for bar in lane[at:]:
+                if bar.start > scale.stop:
+                    break
+                _bar(ui, session, state, bar, y, scale)
+        now = scale.across(session.moment)
+        if scale.x0 <= now <= scale.x1 and session.length:
+            low, high = ImVec2(now, top), ImVec2(now + ui.px(1.5), top + imgui.get_window_height())
+            draw.add_rect_filled(low, high, packed(ui.palette.text))
+        if lanes.box is not None:
+            begun, here = ImVec2(*lanes.box[:2]), imgui.get_mouse_pos()
+            draw.add_rect_filled(begun, here, packed(ui.palette.text, 0.12))
+            draw.add_rect(begun, here, packed(ui.palette.text, 0.6))
     return let_go
 
 
@@ -255,22 +251,21 @@ def _bar(ui: Ui, session: Session, state: EditorState, bar: Bar, y: float, scale
     icon = "mute" if bar.muted else ICONS.get(kind, kind)
     icon = icon if icon in icons.PATHS else "force"
     is_numbered, room = isinstance(one, RecipeHandle | RecipePin), right - left - ui.px(10)
-    imgui.push_font(ui.fonts.regular, 12.5)
-    words = name_of(one, bar.which)
-    if is_numbered and ui.px(18) + imgui.calc_text_size(words).x > room:
-        words = str(bar.which[1] + 1)  # as at its mark on the picture, which tells more than the icon
-    width = imgui.calc_text_size(words).x
-    x = max(left, scale.x0) + ui.px(6)
-    draw.push_clip_rect(low, ImVec2(high.x - ui.px(4), high.y), True)
-    if room > (ui.px(18) + width if is_numbered else ui.px(16)):
-        icons.draw(draw, icon, x, y + ui.px(3.5), ui.px(13), ink, 2.0)
-        x += ui.px(18)
-    if room > (width if is_numbered else ui.px(50)):
-        draw.add_text(ImVec2(x, y + ui.px(3)), ink, words)
-    draw.pop_clip_rect()
-    if is_numbered and room <= width < min(scale.across(bar.stops), scale.x1) - right - ui.px(8):
-        draw.add_text(ImVec2(right + ui.px(4), y + ui.px(3)), packed(palette.text, 0.9), words)
-    imgui.pop_font()
+    with imgui_ctx.push_font(ui.fonts.regular, 12.5):
+        words = name_of(one, bar.which)
+        if is_numbered and ui.px(18) + imgui.calc_text_size(words).x > room:
+            words = str(bar.which[1] + 1)  # as at its mark on the picture, which tells more than the icon
+        width = imgui.calc_text_size(words).x
+        x = max(left, scale.x0) + ui.px(6)
+        draw.push_clip_rect(low, ImVec2(high.x - ui.px(4), high.y), True)
+        if room > (ui.px(18) + width if is_numbered else ui.px(16)):
+            icons.draw(draw, icon, x, y + ui.px(3.5), ui.px(13), ink, 2.0)
+            x += ui.px(18)
+        if room > (width if is_numbered else ui.px(50)):
+            draw.add_text(ImVec2(x, y + ui.px(3)), ink, words)
+        draw.pop_clip_rect()
+        if is_numbered and room <= width < min(scale.across(bar.stops), scale.x1) - right - ui.px(8):
+            draw.add_text(ImVec2(right + ui.px(4), y + ui.px(3)), packed(palette.text, 0.9), words)
 
 
 def _after(ui: Ui, bar: Bar, y: float, colour: int, scale: Scale) -> None:

@@ -9,7 +9,7 @@ from itertools import pairwise
 from math import cos, hypot, pi, sin
 from typing import Any
 
-from imgui_bundle import imgui
+from imgui_bundle import imgui, imgui_ctx
 from imgui_bundle.imgui import ImVec2
 
 from app.model.handles import in_words
@@ -186,12 +186,11 @@ def _number(ui: Ui, label: str, at: ImVec2, is_left: bool, is_lit: bool, lines: 
     """
     ground, ink = (packed(ui.palette.accent), ui.palette.on_accent) if is_lit else (packed(BLACK, 0.5), WHITE)
     words = _words(label)
-    imgui.push_font(ui.fonts.bold, 12.0)
-    size, box = imgui.calc_text_size(words), ImVec2(ui.px(3), 0.0)
-    at = ImVec2(at.x - (size.x if is_left else 0.0), at.y - size.y / 2)
-    lines.add_rect_filled(at - box, at + size + box, ground, ui.px(4))
-    lines.add_text(at, packed(ink), words)
-    imgui.pop_font()
+    with imgui_ctx.push_font(ui.fonts.bold, 12.0):
+        size, box = imgui.calc_text_size(words), ImVec2(ui.px(3), 0.0)
+        at = ImVec2(at.x - (size.x if is_left else 0.0), at.y - size.y / 2)
+        lines.add_rect_filled(at - box, at + size + box, ground, ui.px(4))
+        lines.add_text(at, packed(ink), words)
 
 
 @lru_cache(256)
@@ -262,11 +261,10 @@ def _split(ui: Ui, view: Viewport, split: float, lines: imgui.ImDrawList) -> Non
         tip = ImVec2(x + side * ui.px(8), middle.y)
         low, high = ImVec2(x + side * ui.px(3), middle.y - ui.px(4)), ImVec2(x + side * ui.px(3), middle.y + ui.px(4))
         lines.add_triangle_filled(tip, low, high, packed(rgb("222222")))
-    imgui.push_font(ui.fonts.bold, 12.0)
-    for label, left in (("Before", True), ("After", False)):
-        size = imgui.calc_text_size(label)
-        at = ImVec2(x - size.x - ui.px(18) if left else x + ui.px(18), top + ui.px(14))
-        box = ImVec2(ui.px(7), ui.px(3))
-        lines.add_rect_filled(at - box, at + size + box, packed(BLACK, 0.5), ui.px(5))
-        lines.add_text(at, packed(WHITE), label)
-    imgui.pop_font()
+    with imgui_ctx.push_font(ui.fonts.bold, 12.0):
+        for label, left in (("Before", True), ("After", False)):
+            size = imgui.calc_text_size(label)
+            at = ImVec2(x - size.x - ui.px(18) if left else x + ui.px(18), top + ui.px(14))
+            box = ImVec2(ui.px(7), ui.px(3))
+            lines.add_rect_filled(at - box, at + size + box, packed(BLACK, 0.5), ui.px(5))
+            lines.add_text(at, packed(WHITE), label)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from imgui_bundle import imgui
+from imgui_bundle import imgui, imgui_ctx
 from imgui_bundle.imgui import ImVec2
 
 from app.model.handles import RecipeHandle, labelled
@@ -94,14 +94,13 @@ def _amount(ui: Ui, session: Session, state: EditorState, across: float) -> None
 
 def _time(ui: Ui, now: float, end: float) -> None:
     corner = imgui.get_cursor_screen_pos()
-    imgui.push_font(ui.fonts.regular, 14.0)
-    shown = f"{now:.2f}"
-    draw = imgui.get_window_draw_list()
-    y = corner.y + (ui.px(32) - imgui.get_font_size()) / 2
-    right = corner.x + ui.px(42)
-    draw.add_text(ImVec2(right - imgui.calc_text_size(shown).x, y), packed(ui.palette.text), shown)
-    draw.add_text(ImVec2(right + ui.px(5), y), packed(ui.palette.faint), f"/  {end:.2f} s")
-    imgui.pop_font()
+    with imgui_ctx.push_font(ui.fonts.regular, 14.0):
+        shown = f"{now:.2f}"
+        draw = imgui.get_window_draw_list()
+        y = corner.y + (ui.px(32) - imgui.get_font_size()) / 2
+        right = corner.x + ui.px(42)
+        draw.add_text(ImVec2(right - imgui.calc_text_size(shown).x, y), packed(ui.palette.text), shown)
+        draw.add_text(ImVec2(right + ui.px(5), y), packed(ui.palette.faint), f"/  {end:.2f} s")
     imgui.dummy(ImVec2(ui.px(108), ui.px(32)))
 
 
