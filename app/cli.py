@@ -335,15 +335,13 @@ def render(
     Or give a name for each, such as OUT/{name}-w.png.
     """
     from app.work.jobs import MapOutput, Outputs
-    from app.work.tasks import Edits, Task, opened
+    from app.work.tasks import Task, edited, opened
 
-    tables = {
-        "fluid": {"grid": grid, "solver": solver},
-        "output": {"size": size, "fps": fps, "quality": quality, "filter": filter_},
-        "time": {"start": start, "end": end},
-    }
-    edits = Edits.of(tables, {"duration": duration, "amount": amount})
-    edits.applied(opened(recipe, max_pixels).recipe)
+    edits = {
+        "fluid.grid": grid, "fluid.solver": solver, "output.size": size, "output.fps": fps, "output.quality": quality,
+        "output.filter": filter_, "time.start": start, "time.end": end, "duration": duration, "amount": amount,
+    }  # fmt: skip
+    edited(opened(recipe, max_pixels).recipe, edits)
     if output is None and map_ is None:
         output = Path("out.png")
     maps = MapOutput(map_, "offsets" if offsets else "st", forward, overscan, map_size) if map_ else None
@@ -621,10 +619,10 @@ def apply(
     from app.model.recipe import Recipe
     from app.work.apply_job import Application
     from app.work.jobs import Outputs
-    from app.work.tasks import Edits
+    from app.work.tasks import edited
 
-    output_keys = {"size": size, "fps": fps, "quality": quality, "filter": filter_}
-    asked = Edits.of({"output": output_keys}, {"edges": edges}).applied(Recipe())
+    keys = {"output.size": size, "output.fps": fps, "output.quality": quality, "output.filter": filter_, "edges": edges}
+    asked = edited(Recipe(), keys)
     order = Application(
         picture=pictures[0],
         outputs=Outputs(output, part=_part(frames), bits=bits, strip=strip, codec=codec, resume=resume, dpi=dpi),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from dataclasses import fields, is_dataclass
+from dataclasses import is_dataclass
 from inspect import signature
 from pathlib import Path
 from typing import Any
@@ -60,9 +60,8 @@ FLAGS = {"filter_": "--filter", "start": "--from", "end": "--to"}
 
 def edit(name: str, value: object) -> tuple[str, dict[str, Any]]:
     key = name.rstrip("_")
-    table = next((table for table, keys in TABLES.items() if key in keys), None)
-    expected = {"edits.keys": ((key, value),)} if table is None else {"edits.tables": ((table, ((key, value),)),)}
-    return f"{FLAGS.get(name, f'--{name}')} {value}", expected
+    table = next((f"{table}." for table, keys in TABLES.items() if key in keys), "")
+    return f"{FLAGS.get(name, f'--{name}')} {value}", {f"edits.{table}{key}": value}
 
 
 WAYS: dict[str, tuple[str, dict[str, tuple[str, dict[str, Any]]]]] = {
@@ -135,9 +134,9 @@ SEVERAL = {"render": "a.toml cat.png dog.png -o out", "apply": "m.npy cat.png do
 def flat(order: object, above: str = "") -> dict[str, Any]:
     """The fields of an order by their names; those of a part have the name of that part before theirs."""
     found: dict[str, Any] = {}
-    for each in fields(order):  # pyright: ignore[reportArgumentType]
-        value = getattr(order, each.name)
-        found |= flat(value, f"{above}{each.name}.") if is_dataclass(value) else {f"{above}{each.name}": value}
+    for name, value in (order if isinstance(order, dict) else vars(order)).items():
+        is_part = is_dataclass(value) or isinstance(value, dict)
+        found |= flat(value, f"{above}{name}.") if is_part else {f"{above}{name}": value}
     return found
 
 

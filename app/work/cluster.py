@@ -102,7 +102,7 @@ def run_on_cluster(
         UserError: if there is no such scheduler, or it goes; how many are written is said.
         Cancelled: if `progress` says so.
     """
-    before = {task: _stamps(task) for task in tasks}
+    before = [_stamps(task) for task in tasks]
     watched, idle = time.monotonic(), False
     inbox, warned = queue.SimpleQueue[tuple[str, str]](), set[tuple[str, str]]()
     with _client(address) as client:
@@ -132,7 +132,7 @@ def run_on_cluster(
                         notice(f"the Dask scheduler at {address} has no worker, and is waited for; {mend}")
         except _Gone:
             # What is written appears whole, so that it can be told by its files alone.
-            written = sum(_are_new(_stamps(task), before[task]) for task in tasks)
+            written = sum(_are_new(_stamps(task), then) for task, then in zip(tasks, before, strict=True))
             raise UserError(
                 f"the Dask scheduler at {address} is gone; {written} of {len(tasks)} pictures are written, and its "
                 "workers may still finish what they have in hand; start it again, and then this for the others"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -40,39 +40,30 @@ FLAGS = {  # by which the command line sets a key of the recipe
 }  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Edits:
-    """What is asked for instead of what the recipe says: keys of its tables, and keys of its own."""
+def edited(recipe: Recipe, edits: Mapping[str, Any]) -> Recipe:
+    """The recipe with what is asked for instead: keys of its own, and of its tables as "output.size"; None leaves one.
 
-    tables: tuple[tuple[str, tuple[tuple[str, Any], ...]], ...] = ()
-    keys: tuple[tuple[str, Any], ...] = ()
-
-    @classmethod
-    def of(cls, tables: dict[str, dict[str, Any]], keys: dict[str, Any]) -> Edits:
-        """Those that were given: not None."""
-        given = {name: tuple((k, v) for k, v in table.items() if v is not None) for name, table in tables.items()}
-        return cls(
-            tuple((name, table) for name, table in given.items() if table),
-            tuple((name, value) for name, value in keys.items() if value is not None),
-        )
-
-    def applied(self, recipe: Recipe) -> Recipe:
-        """The recipe with them. Raises `UserError` where they are no values for it."""
-        parts, cells = dict(self.keys), None
-        for name, table in self.tables:
-            keys = dict(table)
-            cells = keys.pop("grid", None) if name == "fluid" else cells
-            parts[name] = getattr(recipe, name).model_copy(update=keys)
-        edited = recipe.edited(**parts)
-        if cells is not None:
-            edited = on_grid(edited, cells)  # as the editor goes to another grid
-        try:
-            return edited.checked(COMMAND_LINE) if parts else recipe
-        except UserError as error:
-            said = str(error).removeprefix(f"{COMMAND_LINE}: ")
-            for key, flag in FLAGS.items():
-                said = said.replace(key, flag)
-            raise UserError(said) from None
+    Raises `UserError` where they are no values for it.
+    """
+    given = {name: value for name, value in edits.items() if value is not None}
+    if not given:
+        return recipe
+    cells, parts = given.pop("fluid.grid", None), dict[str, Any]()
+    for name, value in given.items():
+        table, _, key = name.rpartition(".")
+        if table:
+            value = parts.get(table, getattr(recipe, table)).model_copy(update={key: value})
+        parts[table or key] = value
+    recipe = recipe.edited(**parts)
+    if cells is not None:
+        recipe = on_grid(recipe, cells)  # as the editor goes to another grid
+    try:
+        return recipe.checked(COMMAND_LINE)
+    except UserError as error:
+        said = str(error).removeprefix(f"{COMMAND_LINE}: ")
+        for key, flag in FLAGS.items():
+            said = said.replace(key, flag)
+        raise UserError(said) from None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,11 +131,11 @@ class Task(Piece):
 
     Attributes:
         recipe: its file, or the name of one that comes with fluidwarp.
-        edits: to the recipe.
+        edits: to the recipe; see `edited`.
     """
 
     recipe: str
-    edits: Edits
+    edits: Mapping[str, Any]
 
     @property
     def label(self) -> str:
@@ -171,7 +162,7 @@ class Task(Piece):
         self.check_names(read if file is None else [*read, file])
         animated = self.outputs.has_frames or bool(frame_numbers(own))
         source = found.source(self.picture, self.max_pixels, animated)
-        recipe = self.edits.applied(found.recipe)
+        recipe = edited(found.recipe, self.edits)
         return Job(recipe, source.picture, found.folder, self.outputs, source.clip, named_by=found.label)
 
 

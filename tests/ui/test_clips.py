@@ -28,7 +28,7 @@ from app.ui.files import tick_for
 from app.work.export import run
 from app.work.jobs import Outputs
 from app.work.journal import Origin, project_of
-from app.work.tasks import Edits, Task
+from app.work.tasks import Task
 from solver.gl.device import Device
 from support.editing import Robot, export_dialog, pattern
 from support.widgets import Widgets
@@ -136,9 +136,7 @@ def test_what_is_exported_is_what_the_command_line_makes(viewer: Robot, device: 
 
     def rendered(recipe: str, output: str, **options: object) -> bytes:
         outputs = Outputs(tmp_path / output, **options)  # type: ignore[arg-type]
-        Task(recipe=str(tmp_path / recipe), edits=Edits(), picture=None, outputs=outputs).perform(
-            lambda: device, Progress()
-        )
+        Task(recipe=str(tmp_path / recipe), edits={}, picture=None, outputs=outputs).perform(lambda: device, Progress())
         return outputs.file.read_bytes() if outputs.file and outputs.file.exists() else b""
 
     whole = (tmp_path / "dialog.mp4").read_bytes()

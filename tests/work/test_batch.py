@@ -36,7 +36,7 @@ from app.work.batch import run_batch
 from app.work.fitting import Fit
 from app.work.jobs import Job, MapOutput, Outputs
 from app.work.replay import Replay
-from app.work.tasks import Edits, Task, named, spread
+from app.work.tasks import Task, named, spread
 from app.work.worker import Outcome, Status, Work, perform
 from solver.gl.context import NoSuchDevice
 from solver.gl.device import Device
@@ -72,7 +72,7 @@ def _shared(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def order(recipe: str | Path, picture: Path | None, outputs: Outputs) -> Task:
-    return Task(recipe=str(recipe), edits=Edits(), picture=picture, outputs=outputs)
+    return Task(recipe=str(recipe), edits={}, picture=picture, outputs=outputs)
 
 
 def draw(path: Path, number: int, width: int = 64) -> None:

@@ -34,7 +34,7 @@ from app.model.picture import Picture
 from app.progress import Progress
 from app.work.apply_job import Application, MapSource
 from app.work.jobs import Outputs
-from app.work.tasks import Edits, Piece, Task
+from app.work.tasks import Piece, Task
 from solver.gl.device import Device
 from support.commands import Run
 
@@ -663,7 +663,7 @@ def outcome_of(device: Device, piece: Piece) -> tuple[list[str], Seen | None]:
 def rendered(device: Device, folder: Path, path: Path, outputs: Outputs) -> tuple[list[str], Seen | None]:
     """See `outcome_of`."""
     recipe = folder / "still.toml"
-    return outcome_of(device, Task(recipe=str(recipe), edits=Edits(), picture=path, outputs=outputs))
+    return outcome_of(device, Task(recipe=str(recipe), edits={}, picture=path, outputs=outputs))
 
 
 def is_all_kept_or_told(things: Made, said: list[str], found: Seen | None) -> bool:
@@ -718,7 +718,7 @@ def test_a_still_keeps_what_it_has_or_it_is_told_whichever_way_it_is_warped(
     for number, (way, size) in enumerate(product(("recipe", "False.exr", "True.exr"), (None, 2 * picture.width))):
         outputs = Outputs(folder / f"{name}-{number}.exr")
         if way == "recipe":
-            edits = Edits.of({"output": {"size": size}}, {})
+            edits = {"output.size": size}
             piece = Task(recipe=str(folder / "still.toml"), edits=edits, picture=path, outputs=outputs)
         else:
             piece = Application(maps=MapSource(folder / way), picture=path, outputs=outputs, size=size)

@@ -26,7 +26,7 @@ from app.media.source import open_source
 from app.progress import Progress
 from app.work.apply_job import Application, MapSource
 from app.work.jobs import Outputs
-from app.work.tasks import Edits, Task
+from app.work.tasks import Task
 from solver.gl.device import Device
 
 WIDTH, HEIGHT = 40, 24
@@ -193,7 +193,7 @@ def test_a_recipe_moves_with_the_durations(device: Device, tmp_path: Path):
     Image.fromarray(picture(2)).save(tmp_path / "one.png")
     for source, output in (("a.apng", "a.%02d.png"), ("one.png", "one.%02d.png")):
         outputs = Outputs(tmp_path / output)
-        task = Task(recipe=str(tmp_path / "a.toml"), edits=Edits(), picture=tmp_path / source, outputs=outputs)
+        task = Task(recipe=str(tmp_path / "a.toml"), edits={}, picture=tmp_path / source, outputs=outputs)
         task.perform(lambda: device, Progress())
     mine, theirs = (np.asarray(Image.open(tmp_path / name)) for name in ("a.02.png", "one.35.png"))
     np.testing.assert_array_equal(mine, theirs)

@@ -31,7 +31,7 @@ from app.work.handle_status import ARRIVED, FIT, as_seen, held_in, unmet
 from app.work.jobs import Job, Outputs
 from app.work.replay import Replay
 from app.work.session import Session
-from app.work.tasks import Edits, Task
+from app.work.tasks import Task
 from properties.saved import PAINTING, check_saved, paint
 from solver.gl.device import Device
 from solver.warp.distortion import MOST_PLACES, MapStatistics
@@ -449,7 +449,7 @@ def test_the_command_line_goes_to_another_grid_as_the_editor_does(
         picture=None,
         outputs=Outputs(tmp_path / "asked.png"),
         recipe=str(project),
-        edits=Edits.of({"fluid": {"grid": 48}}, {}),
+        edits={"fluid.grid": 48},
     )
     session.set_grid(48)
     assert session.recipe.stroke[0].detail
