@@ -210,7 +210,7 @@ class Editor:
             self.workspace.keep()
             with self.clock.measure("simulate"):
                 self._advance(dt)
-            for said in self.workspace.look():
+            for said in self.workspace.work.look():
                 self.messages.warn(said)
             self.quality.look(dt)
             self.selecting.look()
@@ -240,7 +240,7 @@ class Editor:
             return 0.0
         if self.clock.hovering and self.backend.is_hovering:
             return PACE
-        if self.workspace.awaits_frame:
+        if self.workspace.work.awaits_frame:
             return AWAITING
         # What goes on elsewhere is looked at now and then: frames would only take the processor from it.
         working = self.exports.is_running or self.fits.is_running

@@ -141,7 +141,7 @@ class Selecting:
     def _colours(self) -> np.ndarray:
         """The picture as it is seen at this moment, small, (h, w, 3) uint8."""
         replay = self.workspace.session.replay
-        picture = self.workspace.shown_picture or replay.small_pictures.load(SOURCE)
+        picture = self.workspace.work.picture or replay.small_pictures.load(SOURCE)
         grid = Grid.for_picture(picture.width, picture.height, min(SHOWN, max(picture.width, picture.height)))
         colours = np.stack([to_grid(channel, grid) for channel in np.moveaxis(channels(picture)[0], 2, 0)], axis=-1)
         return np.rint(255 * replay.as_seen(colours, grid)).astype(np.uint8)

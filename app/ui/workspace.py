@@ -31,7 +31,7 @@ class Work:
     session: Session
     canvas: Canvas | None
     reel: Reel | None = None
-    frame: int = field(init=False)  # of the clip, that the canvas shows
+    frame: int = field(init=False)  # of the clip, that the canvas shows; 0 of a picture
     pixels: np.ndarray | None = field(init=False)  # of that frame, where it is not the first
 
     def __post_init__(self) -> None:
@@ -76,6 +76,11 @@ class Work:
         """A frame of the clip is still to be shown."""
         return self.reel is not None and self.reel.awaits(self.frame)
 
+    @property
+    def picture(self) -> Picture | None:
+        """The frame of the clip, as the canvas shows it, if it is not the first."""
+        return None if self.pixels is None else Picture(self.pixels[..., :3])
+
     def sleep(self) -> Canvas | None:
         """Keep only what makes it; what drew it is to be released."""
         if self.reel is not None:
@@ -113,12 +118,17 @@ class Workspace:
         map_large_blocks()
 
     @property
+    def work(self) -> Work:
+        """The one that is worked on."""
+        return self._works[self._index]
+
+    @property
     def session(self) -> Session:
-        return self._works[self._index].session
+        return self.work.session
 
     @property
     def canvas(self) -> Canvas:
-        return self._works[self._index].wake(self._device)
+        return self.work.wake(self._device)
 
     @property
     def is_dirty(self) -> bool:
@@ -177,31 +187,11 @@ class Workspace:
         if self.session.end or settings.keys() <= {"viscosity", "drag", "walls"}:
             self.session.change(name, **settings)
 
-    def look(self) -> list[str]:
-        """See `Work`."""
-        return self._works[self._index].look()
-
-    @property
-    def awaits_frame(self) -> bool:
-        """See `Work`."""
-        return self._works[self._index].awaits_frame
-
-    @property
-    def shown_frame(self) -> int:
-        """The number of the clip's frame that the canvas shows; 0 of a picture."""
-        return self._works[self._index].frame
-
     @property
     def frames_after_first(self) -> int:
         """How many frames after its first one of the clip the canvas shows; 0 of a picture."""
         clip = self.session.project.clip
-        return self.shown_frame - clip.start if clip else 0
-
-    @property
-    def shown_picture(self) -> Picture | None:
-        """That frame, as the canvas shows it, if it is not the first."""
-        pixels = self._works[self._index].pixels
-        return None if pixels is None else Picture(pixels[..., :3])
+        return self.work.frame - clip.start if clip else 0
 
     def give_up(self, session: Session) -> None:
         """Nobody wants a work back that has been left, unless Undo comes back to it: no crash brings it up again."""

@@ -66,7 +66,7 @@ def viewer(robot: Robot, clip: Path) -> Robot:
 
 def shown(robot: Robot) -> np.ndarray:
     """The frame that is looked up, unless it is the first."""
-    picture = robot.editor.workspace.shown_picture
+    picture = robot.editor.workspace.work.picture
     assert picture is not None
     return picture.pixels
 
@@ -74,7 +74,7 @@ def shown(robot: Robot) -> np.ndarray:
 def go_to(robot: Robot, tick: int) -> None:
     robot.editor.session.seek(tick)
     robot.frame()
-    robot.until(lambda: not robot.editor.session.is_moving and not robot.editor.workspace.awaits_frame)
+    robot.until(lambda: not robot.editor.session.is_moving and not robot.editor.workspace.work.awaits_frame)
 
 
 def test_scrubbing_shows_the_very_frame(viewer: Robot):
@@ -82,7 +82,7 @@ def test_scrubbing_shows_the_very_frame(viewer: Robot):
     assert (session.length, session.dt) == (FRAMES - 1, 1 / 25)
     for tick in (7, 3, FRAMES - 1, 0, 12):
         go_to(viewer, tick)
-        assert session.frame == viewer.editor.workspace.shown_frame == tick
+        assert session.frame == viewer.editor.workspace.work.frame == tick
         np.testing.assert_array_equal(shown(viewer), frame(tick))
     viewer.see()
     seen = viewer.canvas()
@@ -108,7 +108,7 @@ def test_it_is_played_to_its_end_and_painted_on(viewer: Robot):
     viewer.key("space")
     viewer.until(lambda: not session.playing)
     assert session.moment == session.length
-    viewer.until(lambda: viewer.editor.workspace.shown_frame == FRAMES - 1)
+    viewer.until(lambda: viewer.editor.workspace.work.frame == FRAMES - 1)
     viewer.key("ctrl+z")
     assert session.recipe.stroke == ()
 
@@ -220,7 +220,7 @@ def test_pages_and_numbered_files_are_clips_too(robot: Robot, tmp_path: Path, na
             editor.files.write(path, embed=True)
             robot.drop(path)
         go_to(robot, 3)
-        assert editor.workspace.shown_frame == (10 if name.startswith("s") else 3)
+        assert editor.workspace.work.frame == (10 if name.startswith("s") else 3)
         if not name.endswith(".gif"):  # which has 256 colours
             np.testing.assert_array_equal(shown(robot), frame(3))
     assert editor.session.project.embedded != name.startswith("s")
@@ -233,14 +233,14 @@ def test_a_clip_that_is_cut_short_ends_where_it_ends(robot: Robot, clip: Path):
     robot.drop(clip)
     editor = robot.editor
     go_to(robot, FRAMES - 1)
-    last = editor.workspace.shown_frame
+    last = editor.workspace.work.frame
     assert 5 < last < FRAMES - 1
     assert editor.session.length == last
     np.testing.assert_array_equal(shown(robot), frame(last))
     clip.write_bytes(data[: len(data) // 2])
     go_to(robot, 2)
     assert f"Cannot read {clip}: it is not as it was" in editor.messages.shown[-1].text
-    assert not editor.workspace.awaits_frame
+    assert not editor.workspace.work.awaits_frame
     robot.drag((0.4, 0.5), (0.6, 0.5), steps=2)
     assert len(editor.session.recipe.stroke) == 1
 

@@ -316,7 +316,7 @@ def test_works_that_are_opened_in_between_lead_where_they_did(
             go_on(robot, widgets, folder, dice)
             editor.session.settle()
             editor.session.pause()
-            robot.until(lambda: not editor.workspace.awaits_frame)
+            robot.until(lambda: not editor.workspace.work.awaits_frame)
             editor.commands.closed = False
             told = [message.text.replace(str(folder), "FOLDER") for message in editor.messages.shown]
             what.add(now(robot) | {"messages": told})
