@@ -22,7 +22,6 @@ from app.progress import Progress
 from app.work.export import displacement
 from app.work.replay import Replay
 from solver.gl.device import Device
-from solver.grid import Grid
 from solver.resample.plan import Sampling
 from solver.resample.sampler import Sampler
 from solver.warp.distortion import MapStatistics
@@ -48,7 +47,6 @@ class Played:
     """
 
     recipe: Recipe
-    grid: Grid
     source: np.ndarray
     result: np.ndarray
     stills: Mapping[float, np.ndarray]
@@ -102,7 +100,6 @@ class Studio:
                     write(frame)
                 found = Played(
                     recipe=recipe,
-                    grid=replay.grid,
                     source=source,
                     result=frame,
                     stills=kept,
