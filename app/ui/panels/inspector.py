@@ -12,7 +12,7 @@ from typing import Any
 
 import moderngl
 import numpy as np
-from imgui_bundle import imgui
+from imgui_bundle import imgui, imgui_ctx
 from imgui_bundle.imgui import ImVec2
 
 from app.model.handles import ARRIVED, RecipeHandle, RecipePin, heading, labelled
@@ -62,8 +62,7 @@ def draw(
 ) -> None:
     """All sections, one below the other."""
     session = workspace.session
-    with ui.panel("inspector", rect, (16, 4), imgui.WindowFlags_.none):
-        imgui.begin_child("sections")
+    with ui.panel("inspector", rect, (16, 4), imgui.WindowFlags_.none), imgui_ctx.begin_child("sections"):
         for name, label, section, opened in (
             *_about_selection(ui, workspace, state, selecting, do),
             *_about_handles(ui, workspace, state, do),
@@ -81,7 +80,6 @@ def draw(
                 section()
                 imgui.dummy(ImVec2(0, 0))
             ui.line()
-        imgui.end_child()
 
 
 def _about_handles(
@@ -329,13 +327,12 @@ def _symmetry(ui: Ui, state: EditorState) -> None:
 
 
 def _view(ui: Ui, state: EditorState) -> None:
-    imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(ui.px(8), ui.px(4)))
-    for overlay in state.overlays.values():
-        overlay.shown = ui.check(f"{overlay.label}##overlay", overlay.shown, overlay.key)
-        if overlay.shown:
-            slid = ui.slider(f"opacity {overlay.name}", "Opacity", overlay.opacity, 0, 1, PERCENT, 0.7)
-            overlay.opacity = slid.value
-    imgui.pop_style_var()
+    with imgui_ctx.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(ui.px(8), ui.px(4))):
+        for overlay in state.overlays.values():
+            overlay.shown = ui.check(f"{overlay.label}##overlay", overlay.shown, overlay.key)
+            if overlay.shown:
+                slid = ui.slider(f"opacity {overlay.name}", "Opacity", overlay.opacity, 0, 1, PERCENT, 0.7)
+                overlay.opacity = slid.value
 
 
 def _quality(ui: Ui, workspace: Workspace, quality: Quality) -> None:
@@ -462,15 +459,14 @@ def _history(ui: Ui, workspace: Workspace, state: EditorState) -> None:
             ink = palette.text if number <= present else palette.faint
             if (texture := thumbnails.of(entry.number)) is not None:
                 _thumbnail(ui, texture, corner)
-            imgui.push_font(ui.fonts.regular, 13.5)
-            y = corner.y + (size.y - imgui.get_font_size()) / 2
-            time = f"{entry.recipe.recorded * entry.recipe.fluid.dt:.1f} s"
-            right = corner.x + size.x - ui.px(8) - imgui.calc_text_size(time).x
-            draw.push_clip_rect(corner, ImVec2(right - ui.px(6), corner.y + size.y), True)
-            draw.add_text(ImVec2(corner.x + ui.px(50), y), packed(ink), entry.name)
-            draw.pop_clip_rect()
-            draw.add_text(ImVec2(right, y), packed(palette.dim if number <= present else palette.faint), time)
-            imgui.pop_font()
+            with imgui_ctx.push_font(ui.fonts.regular, 13.5):
+                y = corner.y + (size.y - imgui.get_font_size()) / 2
+                time = f"{entry.recipe.recorded * entry.recipe.fluid.dt:.1f} s"
+                right = corner.x + size.x - ui.px(8) - imgui.calc_text_size(time).x
+                draw.push_clip_rect(corner, ImVec2(right - ui.px(6), corner.y + size.y), True)
+                draw.add_text(ImVec2(corner.x + ui.px(50), y), packed(ink), entry.name)
+                draw.pop_clip_rect()
+                draw.add_text(ImVec2(right, y), packed(palette.dim if number <= present else palette.faint), time)
     clipper.end()
     if state.history_seen != present:
         state.history_seen = present
