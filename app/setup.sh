@@ -29,7 +29,7 @@ need_environment() {
     # profile-guided optimisation, which what pyenv compiles by default lacks; the program starts a quarter quicker.
     python=
     for needed in ", ensurepip" ""; do
-        for candidate in "${PYTHON:-/usr/bin/python3}" python3 python3.14 python3.13 python3.12 python3.11}; do
+        for candidate in "${PYTHON:-/usr/bin/python3}" python3 python3.14 python3.13 python3.12 python3.11; do
             [ -z "$python" ] || break
             if "$candidate" -c "import sys$needed; sys.exit(sys.version_info < (3, 11))" 2>/dev/null; then
                 python=$candidate
