@@ -191,11 +191,12 @@ class Playing(Editing):
         ticks = self._gesture.pen if self._gesture is not None else self.tick + 1
         if self._live.ticks < ticks:
             longer, is_previewed = {"duration": ticks * self.dt}, self._live is not self._base
+            end_together = self._base.ticks == self._live.ticks
             self._live = self._live.edited(**longer)
             self._is_heard = False
-            if self.made is None:
+            if self.made is None and end_together:
                 # What is previewed is no part of what was done before it: it becomes an entry of its own, and what it
-                # has cut off stays in the one before.
+                # has cut off stays in the one before. Where it ends elsewhere, only itself goes on.
                 is_whole = self._base == self.document.recipe
                 self._base = self._base.edited(**longer) if is_previewed else self._live
                 if is_whole:

@@ -287,11 +287,13 @@ class Recording:
         """
         if self._went_back:
             return self.target
-        return self.end + self._beyond if self._changes_at is None else self._changes_at
+        return self._base.recorded + self._beyond if self._changes_at is None else self._changes_at
 
     def _go_on(self) -> int:
         """Go where what is done next begins, and tell the tick; what was recorded after it is left to undo."""
         tick = self.next_tick
+        if self._live is not self._base:  # what is previewed, and not kept, is no part of what is gone on from
+            self._use(self._base)
         self.replay.head_for(tick)
         if tick < self.end:
             self._cut(tick)

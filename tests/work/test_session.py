@@ -15,7 +15,7 @@ from app.errors import UserError
 from app.media import project as projects
 from app.media.pictures import write_picture
 from app.model import edits, toml
-from app.model.bars import Actor, Which
+from app.model.bars import Actor, Which, moved
 from app.model.forces import VortexForce
 from app.model.handles import RecipeHandle
 from app.model.mask_edits import LONGEST_HAND, InvertMask, MaskStroke, mask_edit
@@ -959,6 +959,55 @@ def test_time_that_goes_on_while_a_setting_is_dragged_takes_nothing_from_the_wor
     assert session.recipe.fluid_at(5).drag == 1.0
     session.undo()
     assert session.recipe == entries[-1].recipe
+
+
+@pytest.mark.parametrize("goes_on", ["play", "step"])
+def test_time_that_goes_on_while_a_recording_is_made_shorter_is_no_part_of_the_work_before(
+    session: Session, goes_on: str
+) -> None:
+    for y in (0.4, 0.6):
+        paint(session, "push", (0.3, y), (0.6, y), ticks=8)
+        session.settle()
+    entries, to_the_left = session.document.history.entries, -(session.end - 9)
+    session.edit_bars("Move", {("stroke", 1)}, lambda one: moved(one, to_the_left, session.dt), commit=False)
+    session.settle()
+    assert 0 < session.end < entries[-1].recipe.ticks
+    getattr(session, goes_on)()
+    session.advance(1)
+    assert session.document.history.entries == entries
+    session.commit("Move")
+    assert session.document.history.entries[:-1] == entries
+    session.undo()
+    assert session.recipe == entries[-1].recipe
+
+
+@pytest.mark.parametrize("act", ["masks", "change", "stroke"])
+def test_what_is_done_while_a_bar_is_dragged_begins_where_the_work_ends(session: Session, act: str) -> None:
+    """A mask was seen at a tick that the recording did not have, and gone once it was saved."""
+    paint(session, "push", (0.3, 0.5), (0.6, 0.5), ticks=8)
+    session.settle()
+    before = session.recipe
+    session.edit_bars("Move", {("stroke", 0)}, lambda one: moved(one, 30, session.dt), commit=False)
+    session.settle()
+    assert session.end > before.ticks
+    if act == "masks":
+        session.edit_masks("Invert", InvertMask(kind="invert", of="frozen", tick=0))
+    elif act == "change":
+        session.change("Drag", drag=1.0)
+    else:
+        paint(session, "push", (0.3, 0.3), (0.6, 0.3), ticks=8)
+    session.settle()
+    recipe = session.document.recipe
+    assert recipe.stroke[0] == before.stroke[0]
+    assert [edit.tick for edit in recipe.mask] == [before.ticks] * (act == "masks")
+    assert [change.tick for change in recipe.change] == [before.ticks] * (act == "change")
+    assert [stroke.first_tick for stroke in recipe.stroke[1:]] == [before.ticks] * (act == "stroke")
+    seen = session.replay.warp.read()
+    session.seek(0)
+    session.settle()
+    session.seek(session.end)
+    session.settle()
+    assert np.array_equal(session.replay.warp.read(), seen)
 
 
 def test_nothing_moves_while_what_changes_the_fluid_from_here_on_is_dragged(session: Session) -> None:
