@@ -311,6 +311,26 @@ def test_the_fields_of_a_bar_set_when_how_long_how_strong_and_how_often(painted:
     assert painted.editor.session.end > stroke.end_tick
 
 
+@pytest.mark.parametrize("field", ["Start", "Duration"])
+def test_a_time_that_is_held_on_its_slider_stays_there(painted: Robot, widgets: Widgets, field: str) -> None:
+    """The slider went to one and a half times what it had made of the recording, and so on in every frame."""
+    painted.key("h")
+    painted.click(*place(painted, 1).middle)
+    painted.rest()
+    widgets.look()
+    rect = next(each.rect for each in widgets.drawn if each.words == field)
+    painted.move(*rect.middle)
+    painted.press()
+    painted.move(rect.x + 0.9 * rect.width, rect.middle[1])
+    painted.frame()
+    held = recipe(painted)
+    painted.frame(count=5)
+    assert recipe(painted) == held != painted.editor.session.document.recipe
+    painted.release()
+    painted.frame()
+    assert painted.editor.session.document.recipe == held
+
+
 def test_forces_are_bars_too(robot: Robot, widgets: Widgets) -> None:
     vortex = VortexForce(kind="vortex", point=(0.5, 0.5), strength=2.0, during=(0.5, 1.0))
     robot.editor.session.edit("Forces", force=(vortex, vortex.edited(during=None, formula="sin(t)")), duration=2.0)

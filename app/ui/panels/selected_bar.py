@@ -48,7 +48,8 @@ def draw(ui: Ui, session: Session, state: EditorState) -> None:
 
 
 def _times(ui: Ui, session: Session, which: Which, one: Actor) -> None:
-    dt, end = session.dt, max(session.end, 1)
+    # Of what is saved: what is previewed may end later, and the range would grow under a pointer that rests.
+    dt, end = session.dt, max(session.document.recipe.recorded, 1)
     bar = bar_of(one, which, end, dt)
     if not bar.is_free:
         ui.dim("It acts by a formula of the time.")
