@@ -11,7 +11,7 @@ from app.errors import UserError
 from app.media.project import Project
 from app.model.bars import Changed, Which, check_length, with_changed
 from app.model.edits import check_size, with_change, with_led
-from app.model.handles import RecipeHandle, RecipePin
+from app.model.handles import ARRIVED, RecipeHandle, RecipePin
 from app.model.mask_edits import MaskEdit
 from app.model.recipe import Recipe
 from app.model.windows import with_detail
@@ -158,7 +158,7 @@ class Editing(Painting):
     def _is_away(self) -> bool:
         """Something is not yet where the recipe leads it, at the playhead."""
         self._take_up()
-        return any(held.is_away for held in held_in(self.replay))
+        return any(held.left > ARRIVED for held in held_in(self.replay))
 
     def let_go(self, label: str) -> None:
         """Take a handle or a pin away, as if it had never been."""

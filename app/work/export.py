@@ -32,13 +32,12 @@ from app.media.holding import Losses
 from app.media.maps import map_writer, write_map
 from app.media.numbered import is_sequence
 from app.media.record import Record, digest_of
-from app.model.handles import ARRIVED
 from app.model.picture import Picture, opaque_value
 from app.model.recipe import Recipe
 from app.model.timeline import Dissolve, Sentinel, Timeline, dissolved, frame_positions
 from app.progress import Progress
 from app.work.checkpoints import DEFAULT_BUDGET
-from app.work.handle_status import ANEW, unmet
+from app.work.handle_status import ANEW, near_enough, unmet
 from app.work.jobs import Job, MapOutput, longer_side, result_size
 from app.work.layers import resample_layers, widened
 from app.work.observation import observe
@@ -189,7 +188,7 @@ class _Export:
             only_here = amount != 1 and not self.replay.warp.statistics(every).folds
             self.pictures.notice(f"{said} at an amount of {amount:g}, and in none at 1" if only_here else said)
         # Behind the last frame, as where that was kept or is not the latest, they are still on their way.
-        missed = list(unmet(self.replay, ARRIVED)) if self.replay.tick >= int(self._last_shown) else []
+        missed = list(unmet(self.replay, near_enough(self.replay))) if self.replay.tick >= int(self._last_shown) else []
         for each in missed:
             self.pictures.notice(each.said)
         if any(each.helped for each in missed):

@@ -46,6 +46,7 @@ class Held:
         label: what messages call it.
         start, now, target: where it was when it began, is, and shall be.
         left: how far what is farthest of it is from where it shall be, longer sides, as `unmet` tells it.
+        is_away: it is not where it is led: see `near_enough`.
         line, due: where the points of its line are, and shall be, the first again at the end of a closed one; none of a
             point.
     """
@@ -56,13 +57,15 @@ class Held:
     now: Point
     target: Point
     left: float
+    is_away: bool
     line: Line = ()
     due: Line = ()
 
-    @property
-    def is_away(self) -> bool:
-        """True if it is not where it is led."""
-        return self.left > ARRIVED
+
+def near_enough(replay: Replay) -> float:
+    """How near what has arrived is to where it is led, longer sides: no picture shows less than one of its pixels."""
+    source = replay.pictures.source
+    return max(ARRIVED, 1 / max(source.width, source.height))
 
 
 def held_in(replay: Replay, aimed: int = 0) -> list[Held]:
@@ -78,7 +81,7 @@ def held_in(replay: Replay, aimed: int = 0) -> list[Held]:
         handle.wanted(start, max(replay.time, aimed * dt, handle.ready), dt, np.inf) if handle.goal else start
         for handle, start in zip(handles.handles, starts, strict=True)
     ]
-    found = []
+    found, near = [], near_enough(replay)
     for (label, one), shape, (due, left), *places in zip(
         led,
         shapes,
@@ -91,7 +94,7 @@ def held_in(replay: Replay, aimed: int = 0) -> list[Held]:
         if one.is_in_force(tick, dt):
             start, here, target = places
             lines = [_fractions(each, extent, one.closed) if one.points else () for each in (shape, due)]
-            found.append(Held(one, label, start, here, target, left, *lines))
+            found.append(Held(one, label, start, here, target, left, left > near, *lines))
     return found
 
 

@@ -14,9 +14,9 @@ from typing import Any, TypeVar
 import numpy as np
 
 from app.media.project import Project
-from app.model.handles import ARRIVED, MOST_OBJECTIONS, objections
+from app.model.handles import MOST_OBJECTIONS, objections
 from app.model.windows import on_grid
-from app.work.handle_status import FIT, Held, Unmet, as_seen, held_in, unmet
+from app.work.handle_status import FIT, Held, Unmet, as_seen, held_in, near_enough, unmet
 from app.work.playing import Playing
 from app.work.recording import BUDGET
 from app.work.replay import Replay
@@ -82,7 +82,7 @@ class Session(Playing):
         is_fitted = self.document.history.undo_name == FIT
 
         def find() -> dict[str, Unmet]:
-            return {each.label: each for each in unmet(replay, ARRIVED, is_fitted)}
+            return {each.label: each for each in unmet(replay, near_enough(replay), is_fitted)}
 
         return self._once("unmet", (self._state, is_fitted), find)
 

@@ -318,6 +318,23 @@ def test_a_turn_of_which_all_was_simulated_before_its_slider_was_let_go_arrives(
     assert session.held[0].left < ARRIVED
 
 
+def test_what_is_less_than_a_pixel_away_has_arrived(robot: Robot) -> None:
+    """On a small picture that is more than what handles are led on for, and nobody sees it."""
+    session, width = robot.editor.session, robot.editor.canvas.size[0]
+    handle = RecipeHandle(at=(0.4, 0.5), to=(0.5, 0.5), duration=0.2)
+    found = set[bool]()
+    for ticks in range(8, 30):
+        session.edit("Lead", handle=(handle,), duration=session.dt * ticks)
+        session.seek(session.end)
+        robot.rest()
+        (held,) = session.held
+        if held.left > ARRIVED:
+            found.add(held.left * width > 1)
+            assert held.is_away == (held.left * width > 1)
+            assert bool(session.unmet) == held.is_away
+    assert found == {True, False}
+
+
 @pytest.mark.parametrize("key", ["ctrl+z", "home"])
 def test_a_handle_that_has_gone_under_the_finger_is_not_led(robot: Robot, key: str) -> None:
     robot.key("p")
