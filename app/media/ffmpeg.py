@@ -18,7 +18,8 @@ from app.errors import Cancelled, UserError
 from app.media.files import cannot_write
 from app.progress import beginning, if_abandoned, never
 
-MERE_NEWS = r"(\[[^\]]*\] )*\[(info|warning)\] | *Last message repeated"
+# A packet that is corrupt is a warning to ffmpeg: of a file that was cut it is all that is said.
+MERE_NEWS = r"(\[[^\]]*\] )*\[(info|warning)\] (?!Packet corrupt)| *Last message repeated"
 PIPES = 4  # to a process: its input, output and complaints, and one by which Python hears that it has begun
 PATIENCE = 0.1  # seconds between two looks at the wish to stop
 

@@ -61,11 +61,13 @@ class Video(FileClip):
 
     Attributes:
         frames: by its duration.
+        uncut: how many it should have, if it ends before its header says that it does.
         bits: 8, or 16 for what has more than 8.
         file_size, inode, written: of the file when it was looked into; the last in nanoseconds.
     """
 
     fps: Fraction
+    uncut: int | None = None
     decoder: tuple[str, ...]
     filters: str
     file_size: int
@@ -139,7 +141,9 @@ class Video(FileClip):
             if len(sizes := process.sizes()) > 1:
                 shown = f"{self.width} x {self.height}"
                 notice(About(name, f": its frames are of {' and '.join(sizes)} pixels, and all become {shown}"))
-            if complaint := process.complaint():
+            if self.uncut is not None and self.uncut > count:
+                notice(About(name, f" was cut: of the {self.uncut} frames that it should have, {count} are there"))
+            elif complaint := process.complaint():
                 notice(About(name, f" is damaged, and what could be read of it was used (ffmpeg says: {complaint})"))
             elif self.frames is not None and count < self.frames - max(2, self.fps):  # by more than a second
                 besides = ": its sound is longer, or it was cut" if self.sounds else ""
@@ -164,6 +168,7 @@ def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Vid
     file = Path(path)
     with open_input(file, "video") as stream:
         seen = os.fstat(stream.fileno())  # before it is looked into: what is written after that is a change
+        uncut = _uncut(stream.read(52), seen.st_size)
     told = _banner(file)
     video = next((line for line in told.splitlines() if re.search(r"Stream #0.*: Video: ", line)), None)
     if video is None:
@@ -191,6 +196,7 @@ def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Vid
         height=height,
         fps=fps,
         frames=max(1, round((seconds - late) * fps)) if seconds is not None else None,
+        uncut=uncut,
         sounds=tuple(track.codec for track in sounds),
         layouts=tuple(track.layout for track in sounds),
         roles=tuple(dict.fromkeys(role for track in sounds for role in track.roles)),
@@ -209,6 +215,16 @@ def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Vid
         inode=(seen.st_dev, seen.st_ino),
         written=seen.st_mtime_ns,
     )
+
+
+def _uncut(head: bytes, size: int) -> int | None:
+    """How many frames a file of this size should have, if it is an AVI that was cut; ffmpeg tells how many are left.
+
+    What was never finished has no length in its header, or -1, and tells of no frames (AVI RIFF File Reference).
+    """
+    found = re.match(rb"RIFF(.{4})AVI LIST.{4}hdrlavih.{20}(.{4})", head, re.DOTALL)
+    length, frames = (int.from_bytes(part, "little") for part in found.groups()) if found else (0, 0)
+    return frames if size < 8 + length < 2**32 else None
 
 
 def _wide(video: str) -> str:

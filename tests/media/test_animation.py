@@ -1159,6 +1159,31 @@ def test_a_clip_that_was_cut_before_is_read_and_told(tmp_path: Path):
     assert said[1] == f"{told}: its sound is longer, or it was cut"
 
 
+@pytest.mark.parametrize("before", [0, 100], ids=["between two frames", "in a frame"])
+def test_an_avi_that_was_cut_is_told_by_how_many_frames(tmp_path: Path, before: int):
+    """ffmpeg takes it for as long as what is left; only a frame that is not whole makes it warn."""
+    said: list[str] = []
+    path = generate(tmp_path / "a.avi", "testsrc2=s=64x48:r=10:d=2", "-c:v", "mjpeg")
+    assert len(list(read_clip(path).read_frames(notice=said.append))) == 20
+    assert said == []
+    data = path.read_bytes()
+    os.truncate(path, data.rfind(b"00dc", 0, round(0.9 * len(data))) - before)
+    count = len(list(read_clip(path).read_frames(notice=said.append)))
+    assert 10 < count < 19
+    assert said == [f"{path} was cut: of the 20 frames that it should have, {count} are there"]
+
+
+def test_a_frame_that_is_not_whole_is_told_where_the_file_does_not_say_how_many_there_are(tmp_path: Path):
+    """As of a recording that went on until the power failed: the length in its header is -1."""
+    said: list[str] = []
+    path = generate(tmp_path / "a.avi", "testsrc2=s=64x48:r=10:d=2", "-c:v", "mjpeg")
+    data = path.read_bytes()
+    path.write_bytes(data[:4] + b"\xff" * 4 + data[8 : data.rfind(b"00dc", 0, round(0.9 * len(data))) + 2000])
+    list(read_clip(path).read_frames(notice=said.append))
+    assert [f"{path} is damaged, and what could be read of it was used" in one for one in said] == [True]
+    assert "Packet corrupt" in said[0]
+
+
 @pytest.mark.parametrize("offset", [0, 1.5, 36000])
 @pytest.mark.parametrize("ending", ["mkv", "webm", "mov"])
 def test_a_clip_of_which_the_clock_began_long_before_is_as_long_as_it_is(tmp_path: Path, offset: float, ending: str):
