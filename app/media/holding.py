@@ -103,8 +103,35 @@ def room_of(path: str | os.PathLike[str], picture: Picture, how: Written) -> Roo
     return Room(container.name, frozenset(), depth_of(layout)[0], False, alpha, alpha, None, how)
 
 
-Told = Callable[[Picture, Room], str]
-"""How a loss is told, in words that follow the name of the file; "" if there is none."""
+@dataclass(frozen=True)
+class Named:
+    """A loss that differs from picture to picture.
+
+    Attributes:
+        names: of what is lost of one.
+        words: how it is told, of the names of several, each once.
+    """
+
+    names: tuple[Any, ...]
+    words: Callable[[Sequence[Any]], str]
+
+    def and_of(self, other: Named) -> Named:
+        """What is lost of both."""
+        return Named(tuple(dict.fromkeys((*self.names, *other.names))), self.words)
+
+    def __str__(self) -> str:
+        return self.words(self.names)
+
+
+Told = Callable[[Picture, Room], str | Named]
+"""How a loss is told, in words that follow the name of the file; "" if there is none.
+
+What is looked for in the pixels, which takes long, is told in words that are the same for all pictures."""
+
+
+def _some(names: Sequence[str], word: str) -> str:
+    """Not too many names, with "and" or "or" between them."""
+    return f" {word} ".join([*names[:4], *(["others"] if len(names) > 4 else [])])
 
 
 # Of the pixels ------------------------------------------------------------------------------------------------------
@@ -270,41 +297,54 @@ def _chromaticities(picture: Picture, room: Room) -> str:
     return "cannot tell the primaries (chromaticities) of the picture, and is read as BT.709"
 
 
-def _icc(picture: Picture, room: Room) -> str:
+def _icc(picture: Picture, room: Room) -> str | Named:
     if not picture.icc or (room.kind and fits_profile(picture, room.kind)):
         return ""
-    name = few([profile_name(picture.icc) or "damaged"])
+    name = profile_name(picture.icc) or "damaged"
     if "icc" in room.keeps:
-        return f"lacks the picture's colour profile ({name}), which is not for its colours"
-    return "" if is_srgb(picture.icc) else f"cannot hold the picture's colour profile ({name}), and is read as sRGB"
+        return Named((name,), lambda names: f"lacks {_profile(names)}, which is not for its colours")
+    if is_srgb(picture.icc):
+        return ""
+    return Named((name,), lambda names: f"cannot hold {_profile(names)}, and is read as sRGB")
 
 
-def _chunks(picture: Picture, room: Room) -> str:
+def _profile(names: Sequence[str]) -> str:
+    return f"the picture's colour profile ({few(names)})"
+
+
+def _chunks(picture: Picture, room: Room) -> str | Named:
     if "chunks" in room.keeps or (room.kind is None and b"cICP" in picture.chunks):
         return ""  # a video that cannot tell it is refused: `check_colours_of_picture`
     told = png.unusual(picture.chunks, picture.icc is not None) + png.light(picture.chunks)
-    return f"cannot tell the picture's {' and '.join(told)}" if told else ""
+    return Named(tuple(told), lambda names: f"cannot tell the picture's {_some(names, 'and')}") if told else ""
 
 
-def _wide(picture: Picture, room: Room) -> str:
+def _wide(picture: Picture, room: Room) -> str | Named:
     if picture.wide is None or (room.how.with_margins and "wide" in room.keeps):
         return ""
-    return f"lacks the picture's overscan ({max(picture.margins)} px beyond the display window)"
+    return Named((max(picture.margins),), _overscan)
 
 
-def _origin(picture: Picture, room: Room) -> str:
+def _overscan(widths: Sequence[int]) -> str:
+    most = f"{'up to ' if len(widths) > 1 else ''}{max(widths)}"
+    return f"lacks the picture's overscan ({most} px beyond the display window)"
+
+
+def _origin(picture: Picture, room: Room) -> str | Named:
     if picture.origin == (0, 0) or "origin" in room.keeps:
         return ""
-    return f"begins at 0, 0 and not at {picture.origin[0]}, {picture.origin[1]} as the display window"
+    own = f"{picture.origin[0]}, {picture.origin[1]}"
+    return Named((own,), lambda names: f"begins at 0, 0 and not at {_some(names, 'or')} as the display window")
 
 
-def _dpi(picture: Picture, room: Room) -> str:
+def _dpi(picture: Picture, room: Room) -> str | Named:
     if not picture.dpi or not room.how.with_dpi or room.kind is None or room.kind.held_dpi is None:
         return ""
     held = room.kind.held_dpi(picture.dpi)
     if np.allclose(held, picture.dpi, rtol=0, atol=PNG_STEP):
         return ""
-    return f"says {_dots(held)} dpi and not {_dots(picture.dpi)} as the picture: {room.name} holds whole numbers"
+    dots = f"{_dots(held)} dpi and not {_dots(picture.dpi)}"
+    return Named((dots,), lambda names: f"says {_some(names, 'or')} as the picture: {room.name} holds whole numbers")
 
 
 def _dots(dpi: tuple[float, float]) -> str:
@@ -315,32 +355,37 @@ def _dots(dpi: tuple[float, float]) -> str:
 def _named(key: str, told: Callable[[Picture], Sequence[str]], words: Callable[[Sequence[str]], str]) -> Told:
     """What is lost of a part with names in it: all where the kind keeps none, else what it has no room for."""
 
-    def lost(picture: Picture, room: Room) -> str:
+    def lost(picture: Picture, room: Room) -> str | Named:
         names = told(picture)
         if room.kind is not None and key in room.keeps:
             but = room.kind.but.get(key)
             unheld = set(but(picture)) if names and but else set[str]()
             names = [name for name in names if name in unheld]
-        return words(names) if names else ""
+        return Named(tuple(names), words) if names else ""
 
     return lost
 
 
-def _layers(picture: Picture, room: Room) -> str:
+def _layers(picture: Picture, room: Room) -> str | Named:
     if not picture.layers or (room.how.with_layers and "layers" in room.keeps):
         return ""
-    numbers = dict.fromkeys(layer.part for layer in picture.layers if layer.part != picture.group[0])
-    parts = [picture.parts[number].get("name") or f"{number + 1}" for number in numbers if number < len(picture.parts)]
-    of_them = f" of the {counted('part', parts)}" if parts else ""
-    return counted("channel", [layer.name for layer in picture.layers]) + of_them
+    parts = {number: part.get("name") or f"{number + 1}" for number, part in enumerate(picture.parts)}
+    parts.pop(picture.group[0], None)
+    return Named(tuple((layer.name, parts.get(layer.part, "")) for layer in picture.layers), _channels)
 
 
-def _attributes(picture: Picture, room: Room) -> str:
+def _channels(layers: Sequence[tuple[str, str]]) -> str:
+    """Channels, each with its part if that is another than the picture's."""
+    names, parts = ([*dict.fromkeys(filter(None, each))] for each in zip(*layers, strict=True))
+    return counted("channel", names) + (f" of the {counted('part', parts)}" if parts else "")
+
+
+def _attributes(picture: Picture, room: Room) -> str | Named:
     if "attributes" in room.keeps:
         return ""
     shape_is_told = picture.dpi is not None and "dpi" in room.keeps
     names = unusual_attributes(picture.attributes, shape_is_told)
-    return counted("attribute", names) if names else ""
+    return Named(tuple(names), lambda names: counted("attribute", names)) if names else ""
 
 
 def _grey(picture: Picture, room: Room) -> str:
@@ -386,7 +431,7 @@ class Losses:
     def __init__(self, path: str | os.PathLike[str], how: Written) -> None:
         self.path, self.how = path, how
         self._own = Path(path).suffix.lower()
-        self._found: dict[str, str] = {}
+        self._found: dict[str, str | Named] = {}
         self._is_light = False
         is_picture = not how.animated or is_sequence(path)
         kinds = {ending for ending in (BETTER if is_picture else BETTER_MOVING) if ending != self._own}
@@ -398,8 +443,14 @@ class Losses:
         room = room_of(self.path, wanted, self.how)
         self._is_light = self._is_light or picture.linear
         for key, told in TABLE.items():
-            if key not in self._found and (said := told(wanted, room)):
-                self._found[key] = said
+            before = self._found.get(key, "")
+            if isinstance(before, str) and before:
+                continue
+            found = told(wanted, room)
+            if isinstance(before, Named) and isinstance(found, Named):
+                found = before.and_of(found)
+            if found and found != before:
+                self._found[key] = found
                 self._better = {ending for ending in self._better if self._would_hold(ending, key, wanted)}
         return picture
 
@@ -413,7 +464,7 @@ class Losses:
         """All of it in a sentence, with a kind of file that would hold it; "" if nothing is lost."""
         groups: dict[str, list[str]] = {}
         for key in filter(self._found.__contains__, TABLE):
-            said = self._found[key]
+            said = str(self._found[key])
             groups.setdefault(next((head for head, (keys, _) in HEADS.items() if key in keys), said), []).append(said)
         if not groups:
             return ""

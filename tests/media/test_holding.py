@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import ExifTags, Image
 
 from app.media.animation import ANIMATIONS
 from app.media.depth import to_bits
 from app.media.formats import FORMATS
 from app.media.holding import Losses, Written
-from app.model.picture import Picture
+from app.model.picture import Layer, Picture
 
 BESIDE: tuple[dict[str, Any], ...] = (
     {}, {"dpi": (72.5, 72.5)}, {"dpi": (30.0, 60.0)}, {"texts": {"Title": "x"}}, {"xmp": b"<x/>"}, {"origin": (1, 2)},
@@ -77,6 +78,57 @@ def test_only_what_is_multiplied_by_alpha_is_divided_by_it(is_light: bool) -> No
     pixels = to_bits(codes, 32) if is_light else codes
     assert not losses("a.png", Picture(pixels)).lost
     assert "above" in losses("a.png", Picture(pixels, premultiplied=True)).lost
+
+
+def sequence(path: str, *pictures: Picture) -> Losses:
+    found = Losses(path, Written(animated=True))
+    for picture in pictures:
+        found.look(picture)
+    return found
+
+
+def test_what_later_pictures_lose_besides_is_told_in_the_same_words() -> None:
+    """Each name once, however often it comes; of many only some, and how many more."""
+    grey = np.zeros((8, 8, 1), np.uint8)
+    one, two, both = (Picture(grey, texts=dict.fromkeys(names, "x")) for names in (["T2"], ["T4"], ["T4", "T2"]))
+    for path, mend in (("a.%d.jpg", "; write .png to keep it"), ("a.gif", "")):
+        assert (
+            sequence(path, Picture(grey), one, one, two, both).said == f"{path} lacks the picture's texts T2, T4{mend}"
+        )
+    many = sequence("a.%d.jpg", *(Picture(grey, texts={f"T{number}": "x"}) for number in range(1000)))
+    assert "lacks the picture's texts T0, T1, T2, T3 and 996 more; write" in many.said
+    exif = [Image.Exif(), Image.Exif()]
+    exif[0][ExifTags.Base.ImageDescription], exif[1][ExifTags.Base.Artist] = "a cup", "me"
+    said = sequence("a.%d.exr", *(Picture(grey, exif=each.tobytes()[6:]) for each in exif)).said
+    assert said == "a.%d.exr lacks the picture's EXIF (ImageDescription, Artist); write .png to keep it"
+
+
+def test_what_is_advised_holds_what_later_pictures_lose_besides() -> None:
+    """A PNG has texts, but none of such names."""
+    grey = np.zeros((8, 8, 1), np.uint8)
+    first, second = (Picture(grey, texts={name: "x"}) for name in ("T", "\u03b1"))
+    assert sequence("a.%d.jpg", first).said.endswith("write .png to keep it")
+    assert sequence("a.%d.jpg", first, second).said.endswith("write .exr to keep it")
+
+
+def test_what_differs_from_picture_to_picture_is_told_shortly() -> None:
+    light = np.zeros((8, 8, 3), np.float32)
+    wide = [Picture(light, wide=np.zeros((8 + by, 8 + by, 3), np.float32), margins=(0, by, by, 0)) for by in (3, 7, 5)]
+    assert "lacks the picture's overscan (up to 7 px beyond" in sequence("a.%d.tif", *wide).said
+    colours = np.zeros((8, 8, 3), np.uint8)
+    gammas = [Picture(colours, chunks={b"gAMA": value.to_bytes(4, "big")}) for value in range(50_000, 150_000, 10_000)]
+    told = "gamma of 0.5 (gAMA) and gamma of 0.6 (gAMA) and gamma of 0.7 (gAMA) and gamma of 0.8 (gAMA) and others"
+    assert f"cannot tell the picture's {told};" in sequence("a.%d.jpg", *gammas).said
+    origins = [Picture(light, origin=(place, 2)) for place in (1, 3, 1)]
+    assert "begins at 0, 0 and not at 1, 2 or 3, 2 as" in sequence("a.%d.tif", *origins).said
+    dots = [Picture(colours, dpi=(dpi, dpi)) for dpi in (72.4, 300.4)]
+    values = np.zeros((8, 8), np.float32)
+    parts = ({"name": "beauty"}, {"name": "depth"}, {})
+    layers = [Picture(light, layers=(Layer(name, values, part=at),), parts=parts) for name, at in (("Z", 1), ("id", 2))]
+    told = "lacks the picture's channels Z, id of the parts depth, 3;"
+    assert told in sequence("a.%d.jpg", *layers, *layers).said
+    told = "says 72 dpi and not 72.4 or 300 dpi and not 300.4 as the picture: JPEG"
+    assert told in sequence("a.%d.jpg", *dots).said
 
 
 def test_a_name_in_capitals_holds_the_same() -> None:
