@@ -351,7 +351,7 @@ def check_colours(path: str | os.PathLike[str], codec: str | None, clip: Clip, a
     if container is None and suffix == ".png":
         return
     stream = Stream(clip.alpha, clip.bits, colours=clip.colours)
-    _check_told(path, codec, container, stream, f"the colours of {clip.path} are {named}")
+    _check_told(path, codec, container, stream, f"the colours of {clip.path} are {named}", not animated)
 
 
 def check_colours_of_picture(
@@ -370,7 +370,7 @@ def check_colours_of_picture(
     container = ANIMATIONS.get(Path(path).suffix.lower()) if kind is None else None
     colours = uncoded(picture.chunks)
     stream = colours and Stream(picture.has_alpha, min(picture.bits, 16), colours=colours)
-    _check_told(path, codec, container, stream, f"the picture's colours are {named}", kind is not None)
+    _check_told(path, codec, container, stream, f"the picture's colours are {named}", not animated)
 
 
 def _check_told(

@@ -168,6 +168,7 @@ def test_colours_go_where_they_can_be_told_and_a_refusal_names_what_tells_them(n
             assert str(raised.value).startswith(f"Cannot write {name}: {said}; write ")
             mends = re.findall(r"(\S*\.\w+)(?: with --codec (\w+))?", str(raised.value).partition("; write ")[2])
             assert mends
+            assert (mends == [(".png", "")]) == (not animated), "of a still a still"
             for other, more in mends:
                 other = f"a{other}" if other.startswith(".") else other
                 check(other, more or None, animated=is_animation(other))
