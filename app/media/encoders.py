@@ -339,8 +339,17 @@ def written_size(path: str | os.PathLike[str], size: tuple[int, int]) -> tuple[i
     return (width + width % 2, height + height % 2) if container is not None and container.even else size
 
 
-def check_colours(path: str | os.PathLike[str], codec: str | None, clip: Clip, animated: bool) -> None:
-    """Raise `UserError` if a file cannot tell what a clip's colours are, or has too few bits for their range."""
+def check_colours(
+    path: str | os.PathLike[str],
+    codec: str | None,
+    clip: Clip,
+    animated: bool,
+    size: tuple[int, int] | None = None,
+) -> None:
+    """Raise `UserError` if a file cannot tell what a clip's colours are, or has too few bits for their range.
+
+    size: of the result, which what is advised instead has room for.
+    """
     if clip.colours.is_usual:
         return
     suffix = Path(path).suffix.lower()
@@ -351,15 +360,19 @@ def check_colours(path: str | os.PathLike[str], codec: str | None, clip: Clip, a
     if container is None and suffix == ".png":
         return
     stream = Stream(clip.alpha, clip.bits, colours=clip.colours)
-    _check_told(path, codec, container, stream, f"the colours of {clip.path} are {named}", not animated)
+    _check_told(path, codec, container, stream, f"the colours of {clip.path} are {named}", not animated, size)
 
 
 def check_colours_of_picture(
-    path: str | os.PathLike[str], codec: str | None, picture: Picture, animated: bool = False
+    path: str | os.PathLike[str],
+    codec: str | None,
+    picture: Picture,
+    animated: bool = False,
+    size: tuple[int, int] | None = None,
 ) -> None:
     """Raise `UserError` if a file cannot tell what a picture's colours are, or has too few bits for their range.
 
-    Where the picture has a profile as well, that may tell it.
+    Where the picture has a profile as well, that may tell it. For `size` see `check_colours`.
     """
     codes = picture.chunks.get(b"cICP")
     if codes is None or not (named := unusual_colours(codes[0], codes[1])):
@@ -370,7 +383,7 @@ def check_colours_of_picture(
     container = ANIMATIONS.get(Path(path).suffix.lower()) if kind is None else None
     colours = uncoded(picture.chunks)
     stream = colours and Stream(picture.has_alpha, min(picture.bits, 16), colours=colours)
-    _check_told(path, codec, container, stream, f"the picture's colours are {named}", not animated)
+    _check_told(path, codec, container, stream, f"the picture's colours are {named}", not animated, size)
 
 
 def _check_told(
@@ -379,13 +392,14 @@ def _check_told(
     container: Container | None,
     stream: Stream | None,
     what: str,
-    is_still: bool = False,
+    is_still: bool,
+    size: tuple[int, int] | None,
 ) -> None:
     """Raise `UserError` for colours that a file of this kind cannot tell, as only some videos can.
 
     stream: what of them a video would be made of; None if none can tell them.
     """
-    kinds = [kind for kind in TELLING.items() if _is_offered(stream, *kind)] if stream is not None else []
+    kinds = [kind for kind in TELLING.items() if _is_offered(stream, *kind, size)] if stream is not None else []
     videos = ", ".join(f"{ending} with --codec {codec}" if codec else ending for ending, codec in kinds)
     before_last = ", or " if len(kinds) > 1 else " or "
     mend = "write .png" if is_still else f"write {before_last.join(filter(None, (videos, 'name.%04d.png')))}"
@@ -395,11 +409,12 @@ def _check_told(
         raise UserError(f"Cannot write {path}: {what}, and 8 bits are too few; {mend}.")
 
 
-def _is_offered(stream: Stream, ending: str, codec: str | None) -> bool:
-    """Whether frames can be written so, and by this ffmpeg."""
+def _is_offered(stream: Stream, ending: str, codec: str | None, size: tuple[int, int] | None) -> bool:
+    """Whether frames can be written so, in this size, and by this ffmpeg."""
     try:
+        check_animation(f"name{ending}", codec=codec, size=size)
         return _has_bits(ANIMATIONS[ending].encoding(codec), stream)
-    except UserError:  # an encoder that is not there
+    except UserError:  # an encoder that is not there, or holds no such size
         return False
 
 

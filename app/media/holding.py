@@ -19,7 +19,7 @@ from app.media.codecs import png
 from app.media.codecs.exr import unusual_attributes
 from app.media.codecs.metadata import profile_name, tag_names
 from app.media.depth import as_half, few_rows, to_bits
-from app.media.encoders import ANIMATIONS, Stream, check_colours_of_picture, depth_of, has_alpha
+from app.media.encoders import ANIMATIONS, Stream, check_colours_of_picture, check_output, depth_of, has_alpha
 from app.media.formats import Format, fits_profile, is_srgb, picture_format, written_depth
 from app.media.losses import REC709, counted, few
 from app.media.numbered import is_sequence
@@ -44,6 +44,7 @@ class Written:
         with_dpi: whether its own resolution is written.
         strip: its metadata are left out, as was asked for; of them nothing is lost.
         clip: that it is a frame of.
+        size: (width, height) of what is written; None is its own.
     """
 
     bits: int | None = None
@@ -54,6 +55,7 @@ class Written:
     with_dpi: bool = True
     strip: bool = False
     clip: Clip | None = None
+    size: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True)
@@ -485,9 +487,10 @@ class Losses:
         """Whether a file of this ending, written as is usual, would hold what this one does not."""
         other, how = Path(self.path).with_suffix(ending), replace(self.how, bits=None, codec=None)
         try:
+            check_output(other, animated=how.animated, size=how.size or (picture.width, picture.height))
             check_colours_of_picture(other, None, picture, how.animated)
             return not TABLE[key](picture, room_of(other, picture, how))
-        except UserError:  # colours that it cannot tell, an encoder that is not there
+        except UserError:  # a size or colours that it has no room for, an encoder that is not there
             return False
 
 

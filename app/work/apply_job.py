@@ -16,7 +16,7 @@ from app.media import maps
 from app.media.animation import Frame, animation_writer
 from app.media.clip import WHOLE, rate_of
 from app.media.displacement import Displacement, PixelPlaces, cropped, folds
-from app.media.encoders import check_colours, check_colours_of_picture, check_output, passes, unheld_of_clip
+from app.media.encoders import check_output, passes, unheld_of_clip
 from app.media.files import check_kept, noticing, writable
 from app.media.formats import picture_format
 from app.media.inputs import MAX_PIXELS
@@ -98,7 +98,7 @@ class Application(Piece):
     def check(self) -> None:
         """Find out before the work what would keep it from being written. Raises `UserError`."""
         outputs, output = self.outputs, self._output
-        check_output(output, animated=outputs.animated, fps=self.fps, codec=outputs.codec, bits=outputs.bits)
+        check_output(output, animated=outputs.animated, codec=outputs.codec, bits=outputs.bits)
         maps.check_map(self.maps.path)
         if self.folder is None:
             writable(output)
@@ -119,10 +119,7 @@ class Application(Piece):
         self.make_folder()
         writable(self._output)
         size = self._size(source.picture)
-        check_output(self._output, animated=self.outputs.animated, codec=self.outputs.codec, size=size)
-        if source.clip is not None:
-            check_colours(self._output, self.outputs.codec, source.clip, self.outputs.is_animation)
-        check_colours_of_picture(self._output, self.outputs.codec, source.picture, self.outputs.is_animation)
+        self.outputs.check_room(source.picture, source.clip, size, rate_of(source.clip, self.fps))
         if self.outputs.is_animation and not self.maps.is_sequence and source.clip is None:
             why = "one map and one picture do not make an animation; write a picture, such as out.png"
             raise UserError(f"Cannot write {self._output}: {why}.")
@@ -168,7 +165,7 @@ class _Applying:
         steps = steps_for(self.size)
         self.progress.total = 2 * steps
         given, picture = self._map(self._files[0]), self.source.picture
-        losses = self.outputs.losses(with_margins=self._fits(given, picture))
+        losses = self.outputs.losses(with_margins=self._fits(given, picture), size=self.size)
         losses.look(picture)
         self.notices.append(losses.said)
         self.progress.enter("")
@@ -222,6 +219,7 @@ class _Applying:
             with_layers=is_own,
             with_margins=is_own and self._fits(self._map(self._files[min(self._files)]), self.source.picture),
             clip=clip,
+            size=self.size,
         )
         self.notices += [unheld_of_clip(self.output, outputs.codec, clip, self.size)] if clip else []
         first = max(first, start)

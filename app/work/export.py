@@ -403,7 +403,7 @@ class _Export:
 
     def _losses(self) -> Losses:
         animated, clip = self.outputs.has_frames, self.job.clip if self.outputs.has_frames else None
-        how = {"with_layers": self._has_layers, "with_margins": self._has_margins}
+        how = {"with_layers": self._has_layers, "with_margins": self._has_margins, "size": self.size}
         return self.outputs.losses(animated=animated, clip=clip, **how)
 
     def _look(self, picture: Picture) -> Picture:

@@ -114,6 +114,19 @@ class Outputs:
         if picture_format(self.file).name == "JPEG" and not isclose(held_dpi((self.dpi, self.dpi))[0], self.dpi):
             raise UserError(f"JPEG holds whole dots per inch, not {self.dpi:g}; round --dpi, or write a PNG or TIFF")
 
+    def check_room(self, picture: Picture, clip: Clip | None, size: tuple[int, int], rate: Fraction) -> None:
+        """Raise `UserError` if `file` is of no kind for this picture or clip, in a size and at a rate.
+
+        The colours come first: for what is too large, or shown too fast, another kind is advised that has them as well.
+        """
+        assert self.file is not None
+        kind = {"animated": self.animated, "codec": self.codec, "bits": self.bits}
+        check_output(self.file, **kind)
+        if clip is not None:
+            check_colours(self.file, self.codec, clip, self.is_animation, size)
+        check_colours_of_picture(self.file, self.codec, picture, self.is_animation, size)
+        check_output(self.file, **kind, fps=rate / (clip.shortest if clip else 1), size=size)
+
     def losses(self, **how: Any) -> Losses:
         """For what of the pictures `file` does not hold; `how` is as in `Written`."""
         assert self.file is not None
@@ -225,17 +238,7 @@ class Job:
         outputs = self.outputs
         output, maps = outputs.file, outputs.maps
         if output is not None:
-            check_output(
-                output,
-                animated=outputs.animated,
-                fps=self.rate / (self.clip.shortest if self.clip else 1),
-                codec=outputs.codec,
-                bits=outputs.bits,
-                size=result_size(self.recipe, self.picture),
-            )
-            if self.clip is not None:
-                check_colours(output, outputs.codec, self.clip, outputs.is_animation)
-            check_colours_of_picture(output, outputs.codec, self.picture, outputs.is_animation)
+            outputs.check_room(self.picture, self.clip, result_size(self.recipe, self.picture), self.rate)
         if maps is not None:
             check_map(maps.path)
             self._check_map_size(maps)

@@ -140,6 +140,22 @@ def test_what_is_advised_is_what_this_ffmpeg_can_encode(
         assert str(raised.value).partition("; write ")[2] == f"{offered}.%04d.png."
 
 
+@pytest.mark.parametrize(
+    ("longest", "offered"),
+    [
+        (8192, ".mov, .mkv, .mp4 with --codec h265, .webm with --codec av1, or name"),
+        (9000, ".mov, .mkv, .webm with --codec av1, or name"), (17000, ".mov, .mkv, or name"),
+        (70000, ".mkv or name"),
+    ],
+)  # fmt: skip
+def test_what_is_advised_has_room_for_the_result(monkeypatch: pytest.MonkeyPatch, longest: int, offered: str) -> None:
+    monkeypatch.setattr(ffmpeg, "encoders", lambda: frozenset(["libx264", "libx265", "libaom-av1"]))
+    picture = Picture(np.zeros((4, 4, 3), np.uint16), chunks={b"cICP": bytes([9, 16, 0, 1])})
+    with pytest.raises(UserError) as raised:
+        check_colours_of_picture("a.gif", None, picture, animated=True, size=(longest, longest // 4))
+    assert str(raised.value).partition("; write ")[2] == f"{offered}.%04d.png."
+
+
 @pytest.mark.parametrize("named", TOLD)
 @pytest.mark.parametrize("bits", [8, 16])
 def test_colours_go_where_they_can_be_told_and_a_refusal_names_what_tells_them(named: str, bits: int) -> None:

@@ -111,6 +111,15 @@ def test_what_is_advised_holds_what_later_pictures_lose_besides() -> None:
     assert sequence("a.%d.jpg", first, second).said.endswith("write .exr to keep it")
 
 
+def test_what_is_advised_has_room_for_the_result() -> None:
+    """Of what neither PNG nor TIFF holds, WebP does, and JPEG where that is too large."""
+    exif = Image.Exif()
+    exif[ExifTags.Base.Rating] = 3
+    picture = Picture(np.zeros((8, 8, 3), np.uint8), xmp=b"\xff", exif=exif.tobytes()[6:])
+    for longest, ending in ((16383, ".webp"), (16384, ".jpg")):
+        assert losses("a.exr", picture, size=(longest, 8)).said.endswith(f"; write {ending} to keep all of it")
+
+
 def test_what_differs_from_picture_to_picture_is_told_shortly() -> None:
     light = np.zeros((8, 8, 3), np.float32)
     wide = [Picture(light, wide=np.zeros((8 + by, 8 + by, 3), np.float32), margins=(0, by, by, 0)) for by in (3, 7, 5)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from fractions import Fraction
 from functools import partial
@@ -15,7 +16,7 @@ from app.errors import UserError
 from app.media.clip import USUAL, Colours
 from app.media.displacement import Displacement
 from app.media.maps import write_map
-from app.media.pictures import write_picture
+from app.media.pictures import read_picture, write_picture
 from app.media.video import Video
 from app.model.picture import Picture
 from app.model.recipe import Output, Playback, Recipe
@@ -205,11 +206,51 @@ def test_what_a_file_cannot_hold_is_refused_before_the_work(
     if is_applied:
         order = Application(maps=MapSource(tmp_path / "map.npy"), outputs=how, picture=tmp_path / "in.png", **more)
         check = partial(order.perform, lambda: pytest.fail("the work has begun"), Progress())
-        check = check if "size" in more else order.check  # without a look at the picture
+        check = check if more else order.check  # without a look at the picture
     else:
         check = Job(Recipe(output=Output(**more)), PICTURE, tmp_path, how).check
     with pytest.raises(UserError, match=said):
         check()
+
+
+@pytest.mark.parametrize("is_applied", [False, True], ids=["rendered", "applied"])
+@pytest.mark.parametrize(
+    ("file", "more"),
+    [("a.gif", {"fps": 60}), ("a.gif", {"size": 9000}), ("a.webp", {"size": 17_000}), ("a.%d.jpg", {"size": 17_000})],
+    ids=str,
+)
+def test_what_is_advised_of_a_wide_gamut_is_not_refused_in_its_turn(
+    tmp_path: Path, file: str, more: dict[str, Any], is_applied: bool
+) -> None:
+    """For what is too fast for a GIF it was an APNG, which has no such colours; for what is too large a TIFF."""
+    write_picture(tmp_path / "in.png", replace(PICTURE, chunks={b"cICP": bytes([9, 16, 0, 1])}))
+    zeros = Displacement(np.zeros((60, 100, 2), np.float32))
+    for name in ("map.npy", "map.0.npy", "map.1.npy"):
+        write_map(tmp_path / name, zeros)
+
+    def refusal(name: str, codec: str | None) -> str:
+        how = Outputs(tmp_path / name, codec=codec)
+        if is_applied:
+            maps = MapSource(tmp_path / ("map.%d.npy" if how.is_animation else "map.npy"))
+            order = Application(maps=maps, outputs=how, picture=tmp_path / "in.png", **more)
+            check = partial(order.perform, lambda: pytest.fail("the work has begun"), Progress())
+        else:
+            recipe = Recipe(output=Output(**more))
+            check = Job(recipe, read_picture(tmp_path / "in.png"), tmp_path, how).check
+        try:
+            check()
+        except UserError as error:
+            return str(error)
+        except pytest.fail.Exception as begun:
+            return "" if "has begun" in str(begun) else str(begun)
+        return ""
+
+    said = refusal(file, None)
+    assert "it cannot tell that the picture's colours are BT.2020 PQ; write " in said
+    mends = re.findall(r"(\S*\.\w+)(?: with --codec (\w+))?", said.partition("; write ")[2])
+    assert mends
+    for other, codec in mends:
+        assert refusal(f"b{other}" if other.startswith(".") else other, codec or None) == ""
 
 
 @pytest.mark.parametrize(
