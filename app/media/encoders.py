@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -400,13 +400,19 @@ def _check_told(
     stream: what of them a video would be made of; None if none can tell them.
     """
     kinds = [kind for kind in TELLING.items() if _is_offered(stream, *kind, size)] if stream is not None else []
-    videos = ", ".join(f"{ending} with --codec {codec}" if codec else ending for ending, codec in kinds)
-    before_last = ", or " if len(kinds) > 1 else " or "
-    mend = "write .png" if is_still else f"write {before_last.join(filter(None, (videos, 'name.%04d.png')))}"
+    videos = [f"{ending} with --codec {codec}" if codec else ending for ending, codec in kinds]
     if stream is None or container is None or Path(path).suffix.lower() not in TELLING:
+        mend = _either([".png"] if is_still else [*videos, "name.%04d.png"])
         raise UserError(f"Cannot write {path}: it cannot tell that {what}; {mend}.")
     if not _has_bits(container.encoding(codec), stream):
+        mend = _either([*videos, *(["name.%04d.png"] if stream.bits > 8 else [])])  # which has no more than the stream
         raise UserError(f"Cannot write {path}: {what}, and 8 bits are too few; {mend}.")
+
+
+def _either(kinds: Sequence[str]) -> str:
+    """That one of these is to be written; if there is none, as all are too small, that the result is to be smaller."""
+    *most, last = kinds or [""]
+    return f"write {', '.join(most)}{',' * (len(most) > 1)}{' or ' * bool(most)}{last}" if last else "make it smaller"
 
 
 def _is_offered(stream: Stream, ending: str, codec: str | None, size: tuple[int, int] | None) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Generator
 from contextlib import nullcontext
+from dataclasses import replace
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
@@ -154,6 +155,11 @@ def test_what_is_advised_has_room_for_the_result(monkeypatch: pytest.MonkeyPatch
     with pytest.raises(UserError) as raised:
         check_colours_of_picture("a.gif", None, picture, animated=True, size=(longest, longest // 4))
     assert str(raised.value).partition("; write ")[2] == f"{offered}.%04d.png."
+    shallow = replace(picture, pixels=np.zeros((4, 4, 3), np.uint8))
+    with pytest.raises(UserError) as raised:
+        check_colours_of_picture("a.mp4", None, shallow, animated=True, size=(longest, longest // 4))
+    mend = "make it smaller" if longest > 65534 else "write .mov"
+    assert str(raised.value).endswith(f"BT.2020 PQ, and 8 bits are too few; {mend}.")
 
 
 @pytest.mark.parametrize("named", TOLD)
@@ -184,6 +190,7 @@ def test_colours_go_where_they_can_be_told_and_a_refusal_names_what_tells_them(n
             assert str(raised.value).startswith(f"Cannot write {name}: {said}; write ")
             mends = re.findall(r"(\S*\.\w+)(?: with --codec (\w+))?", str(raised.value).partition("; write ")[2])
             assert mends
+            assert not (few and bits == 8 and "png" in str(raised.value)), "which has 8 bits too"
             assert (mends == [(".png", "")]) == (not animated), "of a still a still"
             for other, more in mends:
                 other = f"a{other}" if other.startswith(".") else other
