@@ -422,6 +422,7 @@ def _part(frames: str | None) -> tuple[int, int | None]:
 
 def _perform_many(tasks: Sequence[Piece], jobs: int, cluster: str | None, verbose: bool) -> None:
     """Do all; what is to be said of several, and why one fails, is said of the first, unless `verbose`, and counted."""
+    from app.media.numbered import number_in
     from app.progress import leave, on_terminal
     from app.work.batch import run_batch
     from app.work.tasks import NAME
@@ -435,7 +436,9 @@ def _perform_many(tasks: Sequence[Piece], jobs: int, cluster: str | None, verbos
 
     def alike(label: str, said: str) -> str:
         """What is said of whichever picture, where it is about a file that is this one's alone."""
-        if isinstance(said, About) and said.file in own[label]:
+        if not isinstance(said, About):
+            return said
+        if said.file in own[label] or any(number_in(name, said.file) is not None for name in own[label]):
             return said.of(NAME + Path(said.file).suffix)
         return said
 

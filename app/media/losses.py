@@ -20,10 +20,10 @@ def lost(file: Path, losses: Sequence[str]) -> str:
 
 
 def joined(note: str, other: str) -> str:
-    """Two notes in one sentence, about the file that the first is about; either may be ""."""
+    """Two notes in one sentence, about what the other is about, of which the first may be a file; either may be ""."""
     if not (isinstance(note, About) and isinstance(other, About)):
         return note or other
-    return About(note.file, f"{note.said}; {other.said.removeprefix(': ') if other.file == note.file else other}")
+    return About(other.file, f"{note.said}; {other.said.removeprefix(': ')}")
 
 
 def few(names: Sequence[str]) -> str:

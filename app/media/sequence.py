@@ -113,7 +113,10 @@ def _negative(path: Path) -> list[str]:
     """That files with numbers below 0 are no frames, where there are some."""
     before, after = (re.escape(part) for part in NUMBER.split(path.name)[:: NUMBER.groups + 1])
     count = sum(re.fullmatch(f"{before}-\\d+{after}", name) is not None for name in os.listdir(path.parent))
-    return [f"of {count} files with numbers below 0 none is used"] if count else []
+    told = (
+        "a file with a number below 0 is not used" if count == 1 else f"{count} files with numbers below 0 are not used"
+    )
+    return [told] if count else []
 
 
 def _said(note: str) -> str:

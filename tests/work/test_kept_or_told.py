@@ -875,6 +875,34 @@ def test_what_many_clips_lose_alike_is_told_of_the_first_also_where_processes_sh
     assert rest == f"fluidwarp: and of 2 more: {{name}}.mkv: {said}"
 
 
+def test_what_many_sequences_lose_alike_is_told_of_the_first(tmp_path: Path, fluidwarp: Run) -> None:
+    """What a file of them has lost, and what is left out of them, under one name."""
+    (tmp_path / "still.toml").write_text(RECIPE)
+    inks = Image.fromarray(smooth()).convert("CMYK")
+
+    def told(*words: str) -> list[str]:
+        ran = fluidwarp(tmp_path, "render", "still.toml", *words)
+        assert ran.returncode == 0, ran.stderr
+        return [line.removeprefix("fluidwarp: ").replace(f"{tmp_path}/", "") for line in ran.stderr.splitlines()]
+
+    for name in "ab":
+        for number in (0, 1):
+            inks.save(tmp_path / f"{name}.{number:04d}.jpg")
+    became = "its inks (CMYK) become RGB"
+    both = ["a.%04d.jpg", "b.%04d.jpg"]
+    assert told(*both, "-o", "out")[:2] == [
+        f"a.%04d.jpg: a.0000.jpg: {became}",
+        f"and of 1 more: {{name}}.jpg: {became}",
+    ]
+    for name in "ab":
+        inks.save(tmp_path / f"{name}.-001.jpg")
+    said = f"{became}; a file with a number below 0 is not used"
+    assert told(*both, "-o", "out") == [f"a.%04d.jpg: {said}", f"and of 1 more: {{name}}.jpg: {said}"]
+    assert told("a.%04d.jpg", "-o", "x.png") == [f"a.%04d.jpg: {said}; of its 2 frames only the first is used"]
+    inks.save(tmp_path / "a.-002.jpg")
+    assert told("a.%04d.jpg", "-o", "o.%d.jpg") == [f"a.%04d.jpg: {became}; 2 files with numbers below 0 are not used"]
+
+
 def test_what_is_said_of_many_pictures_in_the_same_words_is_told_once_whatever_their_names(
     tmp_path: Path, fluidwarp: Run
 ) -> None:

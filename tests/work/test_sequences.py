@@ -549,7 +549,7 @@ def test_what_of_a_sequence_is_not_used_is_told(folder: Path, name: str):
     (folder / f"{name}-001.exr").touch()
     (folder / f"{name}-002.exr.txt").touch()
     assert open_source(folder / f"{name}####.exr").picture.note == (
-        f"{name}####.exr: of 1 files with numbers below 0 none is used"
+        f"{name}####.exr: a file with a number below 0 is not used"
     )
 
 
