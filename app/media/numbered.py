@@ -120,14 +120,14 @@ def listed(names: Sequence[str]) -> tuple[str, bool]:
 
     And whether these are all.
     """
-    alike: dict[tuple[str, str], list[str]] = {}
+    alike: dict[tuple[str, ...], list[str]] = {}
     for name in names:
         stem = os.path.splitext(name)[0]
         found = re.search(r"[0-9]+(?=[^0-9]*$)", stem)
-        start, end = found.span() if found else (len(stem), len(stem))
-        alike.setdefault((name[:start], name[end:]), []).append(name[start:end])
+        around = (name[: found.start()], name[found.end() :]) if found else (name,)
+        alike.setdefault(around, []).append(found[0] if found else "")
     told, left = list[str](), len(names)
-    for (before, after), numbers in list(alike.items())[:MOST_RUNS]:
+    for (before, *after), numbers in list(alike.items())[:MOST_RUNS]:
         runs: list[list[str]] = []
         for number in sorted(numbers, key=lambda number: (len(number.lstrip("0")), number)):
             if runs and runs[-1][-1] and number == f"{int(runs[-1][-1]) + 1:0{len(runs[-1][-1])}d}":
@@ -135,5 +135,7 @@ def listed(names: Sequence[str]) -> tuple[str, bool]:
             else:
                 runs.append([number])
         left -= sum(map(len, runs[:MOST_RUNS]))
-        told.append(before + ",".join("-".join(dict.fromkeys((run[0], run[-1]))) for run in runs[:MOST_RUNS]) + after)
+        told.append(
+            before + ",".join("-".join(dict.fromkeys((run[0], run[-1]))) for run in runs[:MOST_RUNS]) + "".join(after)
+        )
     return ", ".join(told) + (f" and {left} more" if left else ""), not left

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import os
 import stat
@@ -19,6 +20,7 @@ from app.media.inputs import open_input, read_input
 from app.media.numbered import numbered
 
 ONLY_A_FILE = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)  # no link, and no pipe that nobody reads
+NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 MOST = 256 * 2**20  # bytes of a record: two million frames
 
 
@@ -76,7 +78,8 @@ class Record:
             finally:
                 os.close(record)
         except OSError as error:
-            raise cannot_write(self._path, error) from error
+            # What is in the record's place is told by its name; where there is no room, nobody has heard of that.
+            raise cannot_write(self._pattern if error.errno in NO_ROOM else self._path, error) from error
 
     def _line(self, number: int, file: Path) -> str:
         return f"{self._made_of(number)} {digest_of_file(file)} {_size(file)}"

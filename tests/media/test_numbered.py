@@ -108,6 +108,8 @@ def test_missing_numbers_are_named_in_runs_eight_at_most(there: list[int], wante
     ("names", "line"),
     [
         (["b.png", "a.png"], "b.png, a.png"),
+        (["broken.png", "broken2.png", "broken3.png"], "broken.png, broken2-3.png"),
+        (["broken", "broken2"], "broken, broken2"),
         ([f"plate.{number}.exr" for number in (1001, 1010, 1002, 1003, 1004)], "plate.1001-1004,1010.exr"),
         (["f.9.png", "f.10.png", "f.11.png", "g.09.png", "1.mp4"], "f.9-11.png, g.09.png, 1.mp4"),
         (["2024/a.png", "2025/a.png", "b.png"], "2024-2025/a.png, b.png"),

@@ -335,6 +335,23 @@ def test_what_is_put_in_the_place_of_a_record_is_neither_followed_nor_waited_for
     assert (folder / "precious.txt").read_text() == "of somebody"
 
 
+def test_a_record_that_has_no_room_is_told_by_the_name_of_its_sequence(tmp_path: Path):
+    """Nobody has heard of the hidden file beside the frames."""
+    limits = pytest.importorskip("resource")
+    record = Record(tmp_path / "f.%d.png", str)
+    (tmp_path / "f.1.png").write_bytes(b"1")
+    before = limits.getrlimit(limits.RLIMIT_FSIZE)
+    try:
+        limits.setrlimit(limits.RLIMIT_FSIZE, (40, before[1]))
+        record.add(1, tmp_path / "f.1.png")  # of which a part is written
+        with pytest.raises(UserError) as raised:
+            record.add(1, tmp_path / "f.1.png")
+    finally:
+        limits.setrlimit(limits.RLIMIT_FSIZE, before)
+    said = "the file grows larger than this disk allows; choose another folder or a smaller size"
+    assert str(raised.value) == f"Cannot write {tmp_path / 'f.%d.png'}: {said}."
+
+
 def test_a_record_that_becomes_a_link_while_frames_are_written_is_not_followed(tmp_path: Path):
     record = Record(tmp_path / "f.%d.png", str)
     (tmp_path / "f.1.png").write_bytes(b"1")
