@@ -386,12 +386,18 @@ def _perform(piece: Piece, given: list[Path], jobs: int, cluster: str | None, gp
     output = piece.outputs.file
     if len(given) > 1 or cluster is not None or (given and output and _is_folder(output)):
         pieces = spread(piece, given)
-        with no_empty_folder(pieces[0].folder), no_empty_folder(piece.outputs.states):
+        with ExitStack() as stack:
+            for folder in dict.fromkeys([*(one.folder for one in pieces), piece.outputs.states]):
+                stack.enter_context(no_empty_folder(folder))
             _perform_many(pieces, jobs, cluster, verbose)
         return
     piece = piece.named()
-    states = no_empty_folder(piece.outputs.states)
-    with states, ExitStack() as stack, on_terminal(piece.outputs.files[0].name, None, warn=_tell) as progress:
+    with (
+        no_empty_folder(piece.folder),
+        no_empty_folder(piece.outputs.states),
+        ExitStack() as stack,
+        on_terminal(piece.outputs.files[0].name, None, warn=_tell) as progress,
+    ):
         report = piece.perform(lambda: stack.enter_context(Device.headless()), progress)
     _tell(*report.notices, *([report.verdict] if report.verdict else []))
 

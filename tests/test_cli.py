@@ -219,6 +219,26 @@ def test_several_pictures(folder: Path, fluidwarp: Run):
     assert {"cat warped.png", "dog warped.png"} <= here(folder)
 
 
+def test_the_folder_of_a_result_that_is_named_after_its_picture_is_made(folder: Path, fluidwarp: Run):
+    """As one that is given alone is: of one picture or several, and one for each; none is left that is empty."""
+    write_picture(folder / "dog.png", Picture(np.zeros((48, 64, 3), np.uint8)))
+    write_map(folder / "m.npy", Displacement(np.zeros((48, 64, 2), np.float32)))
+    for words in (["render", "a.toml"], ["apply", "m.npy"]):
+        for pictures, output in ((["cat", "dog"], "new/in/{name}.jpg"), (["cat"], "one/{name}.jpg"),
+                                 (["cat", "dog"], "{name}/x.jpg")):  # fmt: skip
+            ran = fluidwarp(folder, *words, *(f"{picture}.png" for picture in pictures), "-o", output)
+            assert (ran.returncode, ran.stderr) == (0, "")
+            for picture in pictures:
+                (folder / output.format(name=picture)).unlink()
+            for made in ("new/in", "new", "one", *pictures):
+                if (folder / made).exists():
+                    (folder / made).rmdir()
+        before = here(folder)
+        for pictures, output in ((["none", "gone"], "{name}/x.jpg"), (["none"], "new/{name}.jpg")):
+            assert fluidwarp(folder, *words, *(f"{picture}.png" for picture in pictures), "-o", output).returncode == 1
+            assert here(folder) == before
+
+
 def test_a_file_whose_name_has_a_number_s_place_is_that_file(folder: Path, fluidwarp: Run):
     """If there is one of exactly that name; as a result it would be a sequence, which nobody has asked for."""
     (folder / "50%d.png").write_bytes((folder / "cat.png").read_bytes())

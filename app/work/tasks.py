@@ -88,11 +88,16 @@ class Piece(ABC):
         return str(self.picture or self.outputs.file)
 
     def named(self) -> Self:
-        """The same with the picture's name where "{name}" stands in the names of what it writes."""
+        """The same with the picture's name where "{name}" stands in the names of what it writes.
+
+        The folder of such a result is made.
+        """
         picture = self.picture
         if picture is None:
             return self
-        return replace(self, outputs=self.outputs.renamed(lambda path: named(path, picture)))
+        file = self.outputs.file
+        folder = named(file, picture).parent if file is not None and NAME in str(file) else self.folder
+        return replace(self, outputs=self.outputs.renamed(lambda path: named(path, picture)), folder=folder)
 
     def make_folder(self) -> None:
         """Called once all is read: what fails before that leaves no empty folder. Raises `UserError`."""
@@ -181,7 +186,7 @@ def _opened(name: str, max_pixels: int, state: tuple[int, ...]) -> Opened:
 
 
 def spread(piece: P, pictures: Sequence[Path]) -> list[P]:
-    """The piece of work for each of the pictures: its output is a folder, which is made, or has "{name}" in it.
+    """The piece of work for each of the pictures: its output is a folder, or has "{name}" in it; a folder is made.
 
     In a folder they keep their names and endings, or get .png where theirs cannot be written.
 
@@ -202,9 +207,9 @@ def spread(piece: P, pictures: Sequence[Path]) -> list[P]:
         one = replace(piece, picture=picture, outputs=replace(piece.outputs, file=into)).named()
         pieces.append(replace(one, outputs=one.outputs.renamed(Path.absolute)))
     _check_apart(pieces)
-    if folder is not None:
+    for folder in dict.fromkeys(one.folder for one in pieces if one.folder is not None):
         check_folder(folder)
-    return [replace(one, folder=folder and folder.absolute()).located() for one in pieces]
+    return [replace(one, folder=one.folder and one.folder.absolute()).located() for one in pieces]
 
 
 def _ending(picture: Path) -> str:
