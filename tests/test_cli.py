@@ -239,6 +239,23 @@ def test_the_folder_of_a_result_that_is_named_after_its_picture_is_made(folder: 
             assert here(folder) == before
 
 
+def test_a_name_that_only_looks_as_if_it_numbered_files_is_refused(folder: Path, fluidwarp: Run):
+    """It was the name of one still; as the name of what is there it is taken as it stands."""
+    write_map(folder / "m.%4d.npy", Displacement(np.zeros((48, 64, 2), np.float32)))
+    before = here(folder)
+    for number in ("%99999d", "%4d", "%0100d"):
+        said = f"{number} does not number its files; write %d, or %04d for 4 digits (99 at most)"
+        for words in (
+            ["render", "a.toml", "-o", f"x.{number}.png"], ["render", "a.toml", "--map", f"x.{number}.exr"],
+            ["apply", "m.%4d.npy", "cat.png", "-o", f"x.{number}.png"],
+            ["convert", "m.%4d.npy", "-o", f"x.{number}.exr"],
+        ):  # fmt: skip
+            ran = fluidwarp(folder, *words)
+            assert (ran.returncode, ran.stderr) == (1, f"fluidwarp: Cannot write {words[-1]}: {said}.\n")
+    assert here(folder) == before
+    assert fluidwarp(folder, "apply", "m.%4d.npy", "cat.png", "-o", "x.png").returncode == 0
+
+
 def test_a_file_whose_name_has_a_number_s_place_is_that_file(folder: Path, fluidwarp: Run):
     """If there is one of exactly that name; as a result it would be a sequence, which nobody has asked for."""
     (folder / "50%d.png").write_bytes((folder / "cat.png").read_bytes())

@@ -17,9 +17,20 @@ NUMBER = re.compile(r"%(?:0(\d{1,2}))?d|#{2,}")
 """What stands for the number in the name of a sequence's files: %d, %04d, or #### for %04d."""
 
 
+NO_NUMBER = re.compile(r"%\d+d")
+"""What looks like it to one who knows printf, and is taken as it stands."""
+
+
 def is_sequence(path: str | os.PathLike[str]) -> bool:
     """Whether `path` numbers its files, as `name.%04d.png` and `name.####.png` do."""
     return NUMBER.search(Path(path).name) is not None
+
+
+def check_number(path: str | os.PathLike[str]) -> None:
+    """Raise `UserError` for a name, of what is written, that was to number its files and does not."""
+    if found := NO_NUMBER.search(NUMBER.sub("", Path(path).name)):
+        mend = "write %d, or %04d for 4 digits (99 at most)"
+        raise UserError(f"Cannot write {path}: {found[0]} does not number its files; {mend}.")
 
 
 def stands_for_files(path: str | os.PathLike[str]) -> bool:

@@ -21,7 +21,7 @@ from app.media.files import check_kept, noticing, writable
 from app.media.formats import picture_format
 from app.media.inputs import MAX_PIXELS
 from app.media.maps import Kind, read_map, telling_of
-from app.media.numbered import check_numbers, is_sequence, numbered_files, stands_for_files
+from app.media.numbered import check_number, check_numbers, is_sequence, numbered_files, stands_for_files
 from app.media.record import Record, digest_of, digest_of_file
 from app.media.source import Source, open_source
 from app.model.picture import Picture
@@ -290,6 +290,7 @@ def converted(source: MapSource, output: Path, kind: Kind, invert: bool, progres
         UserError: if one cannot be read or written.
     """
     maps.check_map(output)
+    check_number(output)
     writable(output)
     files = source.files()
     check_kept(source.path, output)

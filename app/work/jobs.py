@@ -21,7 +21,7 @@ from app.media.formats import picture_format
 from app.media.holding import Losses, Written
 from app.media.inputs import MAX_PIXELS
 from app.media.maps import Kind, check_map
-from app.media.numbered import is_sequence
+from app.media.numbered import check_number, is_sequence
 from app.media.opening import check_picture
 from app.media.pictures import write_picture
 from app.model.picture import Picture
@@ -100,7 +100,9 @@ class Outputs:
         return self.is_animation or (self.file is None and self.maps is not None and self.maps.is_sequence)
 
     def check(self) -> None:
-        """Raise `UserError` for options that do not go with what is written."""
+        """Raise `UserError` for names and options that do not go with what is written."""
+        for path in self.files:
+            check_number(path)
         if self.resume and not any(map(is_sequence, self.files)):
             raise UserError(f"--resume needs a sequence, such as f.%04d.png, and {self.files[0]} is none; leave it out")
         if self.resume and self.stats is not None:
