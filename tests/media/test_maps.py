@@ -371,6 +371,16 @@ def test_damaged_maps(tmp_path: Path, ending: str, damage: str):
     with pytest.raises(UserError, match=f"a{ending}") as raised:
         read_map(path)
     assert "\n" not in str(raised.value)
+    said = str(raised.value).removeprefix(f"Cannot read {path}: ")
+    by_ending = {".flo": "it is not a Middlebury .flo file", ".npy": "it is not a NumPy array, or damaged"}
+    words = {
+        "missing": "there is no such file",
+        "empty": by_ending.get(ending, "the file is empty"),
+        "junk": by_ending.get(ending, "file is truncated or damaged"),
+        "cut": {".flo": "40 x 30 offsets do not fit the length of the file"}.get(ending, "truncated"),
+        "folder": "it is a folder",
+    }
+    assert words[damage] in said
 
 
 def test_a_flo_file_without_pixels_is_none(tmp_path: Path):

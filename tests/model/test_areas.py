@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from itertools import combinations
 
 import cv2
 import numpy as np
@@ -147,6 +148,23 @@ def test_random_parts_added_and_taken_away_are_sets(seed: int) -> None:
     assert np.allclose(outside.coverage(grid, pictures), 1 - edit.coverage(grid, pictures), rtol=0, atol=1e-15)
     assert edges.mean() < 0.5
     assert not before.any()
+
+
+def test_an_area_lies_in_all_that_bounds_it() -> None:
+    """Its window, its outline and its segment, whichever of them it has."""
+    pixels, low = OnePicture(textured()), 0.4
+    bounds = {
+        "window": Window(box=(0.1, 0.2, 0.8, 0.7), shape="ellipse", soft=0.1),
+        "outline": ((0.2, 0.1), (0.9, 0.5), (0.3, 0.9)),
+        "segment": Segment(above=low, below=low + 0.2),
+    }
+    each = {name: Area.model_validate({name: bound}).coverage(GRID, pixels) for name, bound in bounds.items()}
+    for count in range(4):
+        for names in combinations(bounds, count):
+            wanted = np.prod([np.ones((SIZE[1], SIZE[0])), *(each[name] for name in names)], axis=0)
+            area = Area.model_validate({name: bounds[name] for name in names})
+            assert np.allclose(area.coverage(GRID, pixels), wanted, rtol=0, atol=1e-12), names
+            assert count == 0 or 0 < wanted.mean() < 1
 
 
 def test_an_edge_there_and_back_is_none() -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import re
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -188,7 +190,8 @@ def test_save_and_load(tmp_path: Path):
         ),
         ("[[stroke]]\ntool = 'push'\nsamples = [[1, 0, 0, 1], [0, 0, 0, 1]]", "must not go backwards"),
         ("[[stroke]]\ntool = 'push'\nsamples = [[0, 0, nan, 1]]", "'samples[1][3]' must be a finite number"),
-        ("[density]\nsource = [1]", "'source' must be three numbers"),
+        ("[density]\nsource = [1, 1]", "'source' must be three numbers (red, green, blue), not 2"),
+        ("[density]\nsource = [1, 1, 1, 1]", "'source' must be three numbers (red, green, blue), not 4"),
     ],
 )
 def test_faults_are_told_in_a_sentence(text: str, words: str):
@@ -505,6 +508,23 @@ def test_recipes_agree_until_they_differ():
     assert recipe.agrees_until(recipe.edited(change=(Change(tick=7, drag=1.0),))) == 7
     assert recipe.agrees_until(recipe.edited(duration=9.0, name="other")) == float("inf")
     assert recipe.agrees_until(Recipe.parse("[fluid]\ngrid = 64").edited(stroke=recipe.stroke)) == 0
+
+
+@pytest.mark.parametrize("key", ["stroke", "force", "handle"])
+def test_recipes_of_which_one_has_an_equal_part_more_are_not_the_same(key: str):
+    one, other = {
+        "stroke": (push((10, 0.1, 0.2, 1)), push((20, 0.5, 0.2, 1))),
+        "force": Recipe.parse(
+            "[[force]]\nkind = 'vortex'\npoint = [0.1, 0.1]\n[[force]]\nkind = 'vortex'\npoint = [0.5, 0.1]\n"
+        ).force,
+        "handle": Recipe.parse(
+            "[[handle]]\nat = [0.1, 0.1]\nto = [0.2, 0.1]\n[[handle]]\nat = [0.5, 0.1]\nto = [0.6, 0.1]\n"
+        ).handle,
+    }[key]
+    lists = [parts for count in range(4) for parts in product((one, other), repeat=count)]
+    for mine, theirs in product(lists, lists):
+        agreed = Recipe().edited(**{key: mine}).agrees_until(Recipe().edited(**{key: theirs}))
+        assert (agreed == math.inf) == (mine == theirs), (mine, theirs)
 
 
 @pytest.mark.parametrize("other", [(19, 0.5, 0.4, 0.7), (20, 0.6, 0.4, 0.7), (20, 0.5, 0.3, 0.7), (20, 0.5, 0.4, 0.8)])
