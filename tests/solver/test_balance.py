@@ -116,3 +116,15 @@ def test_wide_pushes_on_one_another_keep_the_bound_of_one_together(rings: int):
     weighed = Balance(influence, np.full(2 + rings, 1e-9), shares, owners, np.ones(4), narrow=1)
     found = weighed.strengths(np.array([6.0, 0.0, 0.5][: 2 + rings]))
     np.testing.assert_allclose(found[2:8], np.tile([1 / 3, 0], 3), atol=1e-6)
+
+
+@pytest.mark.parametrize("strongest", range(3))
+def test_wide_pushes_on_one_another_may_do_as_much_as_the_strongest_of_them(strongest: int):
+    """Each within its own bound: those of two moderate handles beside that of a strong one."""
+    influence = np.tile(np.eye(2), 4)  # a narrow push, and three wide ones, all at the one place
+    shares, owners = np.array([1e-9] * 2 + [1.0] * 6), (np.zeros(2), np.zeros(8))
+    bounds = np.array([1.0, 1.0, 1.0, 1.0])
+    bounds[1 + strongest] = 2.0
+    found = Balance(influence, np.full(2, 1e-9), shares, owners, bounds, narrow=1).strengths(np.array([9.0, 0.0]))
+    assert sizes(found[2:8].reshape(3, 2).sum(axis=0)).max() == pytest.approx(2, abs=1e-6)
+    assert (sizes(found[2:8]) <= bounds[1:] + 1e-6).all()

@@ -83,6 +83,26 @@ def test_squares_shine_through_as_far_as_the_picture_is_transparent(device: Devi
     np.testing.assert_allclose(found, picture[..., :3] + (1 - picture[..., 3:]) * squares, atol=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("edges", "how", "alpha"),
+    [("transparent", "constant", 0.0), ("black", "constant", 1.0), ("clamp", "edge", None),
+     ("mirror", "symmetric", None), ("wrap", "wrap", None)],
+)  # fmt: skip
+def test_beyond_the_picture_squares_shine_through_as_far_as_that_is_transparent(
+    device: Device,
+    picture: np.ndarray,
+    edges: str,
+    how: Literal["constant", "edge", "symmetric", "wrap"],
+    alpha: float | None,
+) -> None:
+    colour, around = (0.9, 0.8, 0.7), ((3, 3), (3, 3), (0, 0))
+    found = drawn(device, picture, around=3, EDGES=EDGES[edges], CHECKER=1, light=colour, dark=colour, tile=2.0)
+    wanted = np.pad(picture, around, how)
+    if alpha is not None:
+        wanted[..., 3] = np.pad(picture[..., 3], around[:2], constant_values=alpha)
+    np.testing.assert_allclose(found, wanted[..., :3] + (1 - wanted[..., 3:]) * colour, atol=1e-6)
+
+
 @pytest.fixture(scope="module")
 def golden(shared_device: Device) -> Iterator[Golden]:
     with Golden.of_software(shared_device, "canvas.txt") as golden:

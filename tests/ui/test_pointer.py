@@ -7,6 +7,7 @@ from math import exp
 
 import pytest
 
+from app.model.handles import RecipePin
 from app.ui.events import LEFT, MIDDLE, RIGHT, Mods, Move
 from support.editing import Robot
 
@@ -41,6 +42,42 @@ def test_the_picture_is_panned_with_the_pointer(robot: Robot, by: str) -> None:
     assert robot.at(*PLACE) == pytest.approx((x + 30, y - 20), abs=1e-6)
     session = robot.editor.session
     assert (session.recipe.stroke, session.playing) == ((), False)
+
+
+def test_a_handle_is_marked_where_a_press_would_take_hold_of_it_and_nowhere_else(robot: Robot) -> None:
+    """Not where the press would pan, nor while another drag is under way, nor beneath what lies over the canvas."""
+    editor, pointer = robot.editor, robot.editor.pointer
+    editor.session.edit("Pin", pin=(RecipePin(at=PLACE),))
+    robot.rest()
+    editor.state.choose_tool("handle", False)
+    recipe, place = editor.session.recipe, robot.at(*PLACE)
+
+    def is_marked() -> bool:
+        robot.move(*place)
+        robot.frame()
+        return pointer.hovered is not None
+
+    assert is_marked()
+    robot.hold("space", True)
+    assert not is_marked()
+    pull(robot, 30, -20)
+    assert robot.at(*PLACE) == pytest.approx((place[0] + 30, place[1] - 20), abs=1e-6)
+    place = robot.at(*PLACE)
+    assert not is_marked()
+    robot.hold("space", False)
+    assert is_marked()
+    robot.press(MIDDLE)
+    assert not is_marked()
+    robot.release(MIDDLE)
+    assert is_marked()
+    robot.key("f1")
+    assert not is_marked()
+    robot.key("escape")
+    robot.frame(count=2)
+    assert is_marked()
+    editor.state.choose_tool("push", False)
+    assert not is_marked()
+    assert editor.session.recipe == recipe
 
 
 def test_the_wheel_zooms_by_fifteen_percent_a_notch_away_from_the_person(robot: Robot) -> None:

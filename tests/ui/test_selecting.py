@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from dataclasses import replace
@@ -304,6 +305,26 @@ def test_a_click_drops_it_and_so_does_another_picture(robot: Robot, tmp_path: Pa
         robot.frame()
         assert state.selection == ()
         assert state.selected_area is None
+
+
+def test_what_was_looked_for_or_picked_in_one_picture_is_not_selected_in_another(robot: Robot, tmp_path: Path) -> None:
+    editor, state = robot.editor, robot.editor.state
+    state.select_by = "subject"
+    robot.drag((0.1, 0.15), (0.6, 0.85))
+    assert editor.selecting.is_busy
+    editor.open(small_project(tmp_path))
+    robot.frame()
+    assert not editor.selecting.is_busy
+    robot.until(lambda: all(thread.name != "looking for a subject" for thread in threading.enumerate()))
+    robot.frame(count=2)
+    assert (state.selection, editor.messages.shown) == ((), [])
+    for by in ("colour", "brightness"):
+        select(robot, by, (0.5, 0.5))
+        assert state.selection
+        editor.open(small_project(tmp_path))
+        robot.frame()
+        editor.selecting.set_tolerance(0.3, False)
+        assert (state.selection, state.selected_area) == ((), None)
 
 
 def test_with_another_tool_in_hand_nothing_is_filled_or_inverted(robot: Robot) -> None:
