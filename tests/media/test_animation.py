@@ -663,6 +663,7 @@ def test_ten_bits_are_read_as_sixteen(tmp_path: Path):
         ("pcm_s16le", ".mov", "pcm_s16le"),
         ("libopus", ".mov", "pcm_s16le"),
         ("aac", ".gif", None),
+        ("aac", ".apng", None),
     ],
 )
 def test_sound_is_carried_over(tmp_path: Path, source: str, ending: str, codec: str | None):
@@ -674,6 +675,13 @@ def test_sound_is_carried_over(tmp_path: Path, source: str, ending: str, codec: 
     assert [stream["codec_name"] for stream in rest] == ([codec] if codec else [])
     if rest and "duration" in rest[0]:
         assert float(rest[0]["duration"]) == pytest.approx(1, abs=0.1)
+
+
+def test_a_webp_of_a_clip_with_sound_is_written_without_it(tmp_path: Path):
+    clip = generate(tmp_path / "in.mkv", "testsrc=s=64x48:r=10:d=1", "-f", "lavfi", "-i", "sine=d=1")
+    save(tmp_path / "a.webp", 10, 10, sound=clip, frames=10)
+    with Image.open(tmp_path / "a.webp") as image:
+        assert getattr(image, "n_frames", 1) == 10
 
 
 @pytest.mark.parametrize(

@@ -18,6 +18,7 @@ from app.ui.events import LEFT, MIDDLE, RIGHT, CloseWish
 from app.ui.preferences import Preferences
 from app.ui.saving import SaveDialog
 from app.ui.widgets import Ui
+from support.drawn import Drawn
 from support.editing import Robot, pattern, write_foreign_map
 from support.widgets import Widgets
 
@@ -63,6 +64,31 @@ def test_a_mask_of_what_moves_is_asked_for_first_and_then_one_of_where_it_goes_b
         asked.typed = str(there / f"{name}.png")
         widgets.click(button)
     assert fitted == [((), (there / "one.png", there / "other.png"))]
+
+
+@pytest.mark.parametrize("is_typed", [False, True])
+def test_whether_to_replace_is_asked_of_the_file_that_would_be(
+    robot: Robot, widgets: Widgets, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, is_typed: bool
+) -> None:
+    """Of the name below, or of a whole path that was typed above; it is replaced only once the person has said so."""
+    drawn, chosen, there = Drawn(monkeypatch, ()), list[Path](), tmp_path / "there"
+    there.mkdir()
+    for name in ("one.png", "other.png"):
+        (there / name).touch()
+    robot.editor.chooser.ask_where("Save the mask", there / "one.png", (".png",), chosen.append)
+    robot.frame(count=2)
+    asked = robot.editor.dialogs.shown[-1]
+    assert isinstance(asked, Browser)
+    if is_typed:
+        asked.typed = str(there / "other.png")
+    widgets.click("Save")
+    drawn.take()
+    robot.frame()
+    said = [line.split(" | ")[1] for line in drawn.take() if "is there already" in line]
+    name = "other.png" if is_typed else "one.png"
+    assert (said, chosen) == ([f"{name} is there already."], [])
+    widgets.click("Replace")
+    assert (chosen, robot.editor.dialogs.shown) == ([there / name], [])
 
 
 def test_a_mask_that_has_been_changed_meanwhile_is_read_again(robot: Robot, tmp_path: Path) -> None:

@@ -728,3 +728,27 @@ def test_a_still_of_a_clip_s_frame_is_that_file_of_the_sequence(device: Device, 
         assert np.array_equal(found, wanted)
         others.add(found.tobytes())
     assert len(others) == 2
+
+
+@pytest.mark.parametrize(("dt", "solver"), [(1 / 60, "paper"), (0.0625, "mac")])
+def test_the_numbers_tell_what_they_are_of(
+    device: Device, picture: Path, tmp_path: Path, dt: float, solver: str
+) -> None:
+    """As exactly as the recipe says it: times are found again by them."""
+    recipe = Recipe.parse(WHIRL).edited(duration=4 * dt)
+    recipe = recipe.edited(fluid=recipe.fluid.model_copy(update={"dt": dt, "solver": solver, "grid": 32}))
+    outputs = Outputs(tmp_path / "a.png", stats=tmp_path / "a.json")
+    run(device, Job(recipe, open_source(picture).picture, tmp_path, outputs), Progress())
+    told = json.loads((tmp_path / "a.json").read_text("utf-8"))
+    frames = told.pop("frames")
+    assert told == {
+        "fluidwarp": 1,
+        "opengl": device.limits.renderer,
+        "picture": [WIDTH, HEIGHT],
+        "result": [WIDTH, HEIGHT],
+        "grid": [32, round(32 * HEIGHT / WIDTH)],
+        "dt": dt,
+        "solver": solver,
+        "stopped": None,
+    }
+    assert [(frame["frame"], frame["tick"], frame["time"]) for frame in frames] == [(0, 4.0, 4 * dt)]
