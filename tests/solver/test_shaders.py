@@ -12,6 +12,7 @@ import shaders
 from solver.gl.device import Device
 from solver.gl.passes import GL_SAMPLERS
 from solver.gl.program import ShaderError, assemble, compile_program, read_shader
+from solver.gl.tiled import TiledField
 from solver.warp.frozen import FADED
 from solver.warp.state import MOST_CLOSED
 from support.khronos import Programs
@@ -125,3 +126,29 @@ def test_pass_adds_within_its_region(device: Device) -> None:
     expected = np.ones((5, 6), np.float32)
     expected[1:, :2] = 3.0
     np.testing.assert_array_equal(target.get(), expected)
+
+
+@pytest.mark.parametrize("size", [(6, 5), (40, 9), (9, 40)])
+def test_a_pass_draws_and_counts_what_of_its_regions_is_in_the_target(device: Device, size: tuple[int, int]) -> None:
+    """However they reach over its sides, also where one is longer than the other; tiles know what was drawn in them."""
+    (width, height), add = size, device.pass_("step/add_source.frag")
+    source, long = device.upload(np.ones((height, width), np.float32)), max(size) + 3
+    regions = [
+        (1, 2, width - 2, height - 3), (-2, 1, 4, 2), (width - 2, 1, 4, 2), (1, -3, 2, 4), (1, height - 2, 2, 4),
+        (0, 0, long, 2), (0, 0, 2, long), (-long, 1, 2 * long, 1), (1, -long, 1, 2 * long), (-3, -3, 3, 99),
+        (width, 0, 5, 5), (0, height, 5, 5), (-9, -9, 99, 99),
+    ]  # fmt: skip
+    for chosen in (*([region] for region in regions), regions[1:5]):
+        target = TiledField(device, size, 1, "target", tile=8)
+        blank = target.save()
+        wanted = np.zeros((height, width), np.float32)
+        for x, y, across, down in chosen:
+            wanted[max(y, 0) : max(y + down, 0), max(x, 0) : max(x + across, 0)] += 2.0
+        device.timings.take()
+        add(target, add=True, region=chosen if len(chosen) > 1 else chosen[0], source=source, amount=2.0)
+        assert sum(device.timings.texel_writes.values()) == wanted.sum() / 2, chosen
+        np.testing.assert_array_equal(target.get(), wanted)
+        target.restore(blank)
+        assert not target.get().any()
+        blank.release()
+        target.release()

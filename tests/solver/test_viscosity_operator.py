@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
@@ -24,12 +24,15 @@ def along(count: int) -> np.ndarray:
     return np.maximum(1.0 - 0.5 * abs(fine - coarse), 0.0)
 
 
-def across(count: int) -> np.ndarray:
-    """Interpolation of faces across it, 1/4 3/4; beyond a wall lies their image."""
+def across(count: int, sticks: tuple[bool, bool] = (False, False)) -> np.ndarray:
+    """Interpolation of faces across it, 1/4 3/4; beyond a wall lies their image, or nothing where it sticks."""
     weights = np.zeros((count, count // 2))
     for fine in range(count):
         weights[fine, fine // 2] += 0.75
-        weights[fine, min(max(fine // 2 + (1 if fine % 2 else -1), 0), count // 2 - 1)] += 0.25
+        beside = fine // 2 + (1 if fine % 2 else -1)
+        within = min(max(beside, 0), count // 2 - 1)
+        if beside == within or not sticks[beside > 0]:
+            weights[fine, within] += 0.25
     return weights
 
 
@@ -88,6 +91,37 @@ def test_coarse_operators_are_galerkin_products(device: Device, aspect: float) -
         open_coarse = coarse.any(axis=0)
         wanted = (p.T @ fine @ p / 4.0)[open_coarse][:, open_coarse]
         assert abs(coarse[open_coarse][:, open_coarse] - wanted).max() < 1e-6 * abs(wanted).max()
+        nx, ny = nx // 2, ny // 2
+    multigrid.release()
+
+
+@pytest.mark.parametrize("solids", [False, True])
+@pytest.mark.parametrize("sides", [*product([False, True], repeat=4)])
+def test_a_correction_is_spread_by_whether_each_side_sticks(
+    device: Device, sides: tuple[bool, bool, bool, bool], solids: bool
+) -> None:
+    """Whatever solid cells do, of which there are none; onto each finer level."""
+    rng, (nx, ny), (left, right, top, bottom) = np.random.default_rng(5), SIZE, sides
+    viscosity, solid = (10 ** rng.uniform(-2, 4, (ny, nx))).astype(np.float32), np.zeros((ny, nx), bool)
+    multigrid = Multigrid(device, SIZE, (1 / nx, 1 / nx))
+    fields = device.upload(viscosity), device.upload(solid.astype(np.uint8))
+    multigrid.set_coefficients(*fields, viscosity, solid, 1 / nx**2, NoSlip(*sides, solids), Plan())
+    for fine, coarse in pairwise(multigrid.levels):
+        is_open = [np.stack([level.coefficients().open_u, level.coefficients().open_v]) for level in (fine, coarse)]
+        faces = is_open[1] * rng.uniform(1, 2, is_open[1].shape)
+        for field, cells in zip(coarse.faces.read.fields, faces, strict=True):
+            field.set(np.pad(packed(cells), ((1, 1), (1, 1), (0, 0))).astype(np.float32))
+        device.pass_("viscosity/prolong.frag", CORRECTION=1, **fine.defines)(
+            fine.faces.write.fields,
+            region=fine.region,
+            alone=coarse.alone,
+            **coarse.faces.read.inputs("coarse_"),
+            **fine.bounds,
+        )
+        found = np.stack([unpacked(field.get(fine.region)) for field in fine.faces.write.fields])
+        u = across(ny, (top, bottom)) @ faces[0] @ along(nx).T
+        v = along(ny) @ faces[1] @ across(nx, (left, right)).T
+        np.testing.assert_allclose(found, is_open[0] * np.stack([u, v]), atol=1e-5)
         nx, ny = nx // 2, ny // 2
     multigrid.release()
 
