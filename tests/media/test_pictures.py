@@ -6,6 +6,7 @@ import io
 import os
 import struct
 import subprocess
+import sys
 import time
 import zlib
 from dataclasses import replace
@@ -134,6 +135,18 @@ def test_a_deep_avif_is_read_in_its_depth(tmp_path: Path, bits: int, channels: i
     assert read.pixels.dtype == np.uint16
     assert (read.pixels.min(), read.pixels.max()) == (0, 65535)
     np.testing.assert_array_equal(np.round(read.pixels / 65535 * top), values)
+
+
+def test_a_pillow_without_avif_is_told_and_writes_all_else(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    picture = Picture(smooth(3))
+    write_picture(tmp_path / "a.avif", picture)  # Pillow keeps what it has once found, for the tests after this one
+    (tmp_path / "a.avif").unlink()
+    monkeypatch.setitem(sys.modules, "PIL._avif", None)
+    with pytest.raises(UserError, match="Pillow was built without AVIF; use another format or install Pillow"):
+        write_picture(tmp_path / "a.avif", picture)
+    for ending in (".webp", ".jpg", ".png"):
+        write_picture(tmp_path / f"a{ending}", picture)
+    assert {path.suffix for path in tmp_path.iterdir()} == {".webp", ".jpg", ".png"}
 
 
 @pytest.mark.parametrize("channels", MODES, ids=MODES.get)

@@ -6,9 +6,10 @@ import io
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -18,13 +19,15 @@ from app.errors import UserError
 from app.media import project as projects
 from app.media.pictures import read_picture, write_picture
 from app.model.picture import Picture
+from app.model.recipe import Recipe
 from app.ui import clipboard
 from app.ui.preferences import Preferences
 from app.ui.saving import SaveDialog
+from app.work.jobs import Job
 from solver.gl.device import Device
 from support.commands import Run
 from support.desk import Desk, needs_a_screen
-from support.editing import Robot, pattern, small_project
+from support.editing import Robot, export_dialog, pattern, small_project
 
 FILLING = """
 import copykitten, numpy as np
@@ -151,6 +154,44 @@ def test_without_copykitten_a_sentence_says_how_to_get_it(robot: Robot, chord: s
     (message,) = robot.editor.messages.shown
     assert message.text == "Pictures on the clipboard need copykitten; install it with: pip install copykitten"
     assert not robot.editor.exports.is_running
+
+
+class Asked:
+    """Takes the place of the process that exports, of which it has the job."""
+
+    is_done = False
+    jobs: ClassVar[list[Job]] = []
+
+    def __init__(self, job: Job) -> None:
+        self.jobs.append(job)
+
+    def poll(self, warn: object) -> None:
+        """It is never done."""
+
+    def stop(self, then: Callable[[], object] = lambda: None) -> None:
+        then()
+
+
+@pytest.mark.parametrize("way", ["copy", "export"])
+@pytest.mark.parametrize("tick", [0, 1, 4])
+def test_what_is_copied_or_exported_at_any_moment_is_a_recipe_that_can_be_read_again(
+    robot: Robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, tick: int, way: str
+) -> None:
+    """Also at the start: none lasts less than a step."""
+    monkeypatch.setitem(sys.modules, "copykitten", Board())
+    monkeypatch.setattr("app.ui.export_dialog.ExportProcess", Asked)
+    editor, whirl = robot.editor, "[[force]]\nkind = 'vortex'\npoint = [0.5, 0.5]"
+    editor.session.edit("Whirl", force=Recipe.parse(whirl).force, duration=5 * editor.session.dt)
+    robot.rest()
+    editor.session.seek(tick)
+    robot.rest()
+    if way == "export":
+        job = export_dialog(robot, tmp_path).job()
+    else:
+        editor.exports.copy(editor.session)
+        job = Asked.jobs.pop()
+    assert job.recipe.ticks == max(tick, 1)
+    assert Recipe.parse(job.recipe.text()) == job.recipe
 
 
 def test_a_copy_that_is_stopped_is_on_no_clipboard_and_leaves_nothing(
