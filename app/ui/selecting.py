@@ -212,9 +212,9 @@ class Selecting:
         return "" if self.state.selection else SELECT_BY[self.state.select_by]
 
     def look(self) -> None:
-        """See whether a subject has been found, and whether what is selected is still where it was."""
+        """See whether a subject has been found, and whether what is selected, or drawn, is still where it was."""
         (session, version), parts = self._now(), self.state.selection
-        if (parts or self._search) and session is not self._shown[0]:
+        if (parts or self._search or self.path) and session is not self._shown[0]:
             self._forget()
         elif version != self._shown[1] and not session.is_moving and any(part.segment for part in parts):
             self._show(parts)

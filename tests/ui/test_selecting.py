@@ -327,6 +327,22 @@ def test_what_was_looked_for_or_picked_in_one_picture_is_not_selected_in_another
         assert (state.selection, state.selected_area) == ((), None)
 
 
+@pytest.mark.parametrize("by", ["rectangle", "lasso"])
+def test_what_is_being_drawn_over_one_picture_is_not_selected_in_another(robot: Robot, tmp_path: Path, by: str) -> None:
+    robot.key("m")
+    robot.editor.state.select_by = by
+    for number, (x, y) in enumerate(((0.2, 0.2), (0.6, 0.2), (0.6, 0.6))):
+        robot.move(*robot.at(x, y))
+        if number == 0:
+            robot.press()
+    robot.editor.open(small_project(tmp_path))
+    robot.frame()
+    robot.move(*robot.at(0.7, 0.7))
+    robot.release()
+    robot.frame()
+    assert robot.editor.state.selection == ()
+
+
 def test_with_another_tool_in_hand_nothing_is_filled_or_inverted(robot: Robot) -> None:
     select(robot, "rectangle", (0.1, 0.1), (0.5, 0.5))
     robot.key("p")
