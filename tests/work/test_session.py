@@ -27,7 +27,7 @@ from app.model.tools import TOOL, BrushSettings, Press
 from app.progress import Progress
 from app.work.export import run
 from app.work.gesture import kept_near
-from app.work.handle_status import ARRIVED, FIT, as_seen, held_in, unmet
+from app.work.handle_status import FIT, as_seen, held_in, near_enough, unmet
 from app.work.jobs import Job, Outputs
 from app.work.replay import Replay
 from app.work.session import Session
@@ -290,7 +290,7 @@ def test_what_is_looked_for_only_once_is_what_is_there_whatever_has_been_done(se
         held = held_in(replay, session.target)
         amount = replay.recipe.amount
         is_over = not session.is_moving and session.tick == session.end and replay.recipe.leads
-        missed = unmet(replay, ARRIVED) if is_over else ()
+        missed = unmet(replay, near_enough(replay)) if is_over else ()
         assert found[:3] == [
             held, held if amount == 1 else as_seen(held, replay), {each.label: each for each in missed},
         ]  # fmt: skip
