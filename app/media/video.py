@@ -168,7 +168,7 @@ def read_clip(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> Vid
     file = Path(path)
     with open_input(file, "video") as stream:
         seen = os.fstat(stream.fileno())  # before it is looked into: what is written after that is a change
-        uncut = _uncut(stream.read(52), seen.st_size)
+    uncut = _uncut(read_start(file, "video", 52), seen.st_size)
     told = _banner(file)
     video = next((line for line in told.splitlines() if re.search(r"Stream #0.*: Video: ", line)), None)
     if video is None:
