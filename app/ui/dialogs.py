@@ -250,6 +250,7 @@ class Unsaved(Dialog):
     Args:
         workspace: whose work it is.
         what: the person is about to do.
+        can_undo: Undo comes back to the work afterwards, as long as the window is open.
         save: saves, and then does what it is given.
         then: does what the person is about to do.
     """
@@ -258,18 +259,23 @@ class Unsaved(Dialog):
         self,
         workspace: Workspace,
         what: str,
+        can_undo: bool,
         save: Callable[[Callable[[], None]], None],
         then: Callable[[], None],
     ) -> None:
         super().__init__("Save your changes first?")
         self._workspace = workspace
         self._what = what
+        self._can_undo = can_undo
         self._save = save
         self._then = then
 
     def body(self, ui: Ui) -> bool:
         name = self._workspace.session.project.name
-        ui.wrapped(f"What you have done to “{name}” is lost if you {self._what} without saving.", ui.palette.dim, 14)
+        said = f"is lost if you {self._what} without saving."
+        if self._can_undo:
+            said = f"is not saved. If you {self._what}, Undo comes back to it until you quit."
+        ui.wrapped(f"What you have done to “{name}” {said}", ui.palette.dim, 14)
         imgui.dummy(ImVec2(0, ui.px(8)))
         if ui.button("Don't save", width=108):
             session = self._workspace.session

@@ -244,7 +244,7 @@ class Files:
             self._leave(loading)
             self._warn(loading, loading.error)
         elif workspace.is_dirty and workspace.session.document.recipe is not loading.recipe:
-            self.unless_unsaved(f"open {loading.name}", lambda: self._show(loading))
+            self.unless_unsaved(f"open {loading.name}", lambda: self._show(loading), can_undo=True)
         else:
             self._show(loading)
 
@@ -316,11 +316,14 @@ class Files:
         path = project.path or self.preferences.open_from / f"{project.name}{SUFFIX}"
         self.dialogs.show(SaveDialog(project, path, self.preferences, self.chooser, self.write, then))
 
-    def unless_unsaved(self, what: str, then: Callable[[], None]) -> None:
-        """Do something that would lose unsaved work, once the person has said what shall become of it."""
+    def unless_unsaved(self, what: str, then: Callable[[], None], can_undo: bool = False) -> None:
+        """Do something that leaves unsaved work, once the person has said what shall become of it.
+
+        `can_undo`: Undo comes back to it.
+        """
         self.workspace.session.release()
         if self.workspace.is_dirty:
-            self.dialogs.ask(Unsaved(self.workspace, what, self.save, then))
+            self.dialogs.ask(Unsaved(self.workspace, what, can_undo, self.save, then))
         else:
             then()
 

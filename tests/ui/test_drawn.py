@@ -214,7 +214,8 @@ def dialogs(robot: Robot) -> Iterator[str]:
     project, do = editor.session.project, lambda *_: None
     short = replace(project, folder=Path("pictures"))  # words are broken by how long they are
     shown = (
-        Unsaved(editor.workspace, "quit", do, do),
+        Unsaved(editor.workspace, "quit", False, do, do),
+        Unsaved(editor.workspace, "open a.png", True, do, do),
         PictureOrMap("a.exr", do, do),
         SaveDialog(short, Path("folder/a.fluidwarp"), Preferences(), editor.chooser, do, None),
         SaveDialog(short, Path("folder/a.fluidwarp"), Preferences(embed=False), editor.chooser, do, None),

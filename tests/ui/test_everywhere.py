@@ -137,7 +137,7 @@ def over(robot: Robot, places: dict[str, tuple[float, float]]) -> Iterator[str]:
     project = editor.session.project
     keys = KeySheet(editor.keys)
     for dialog in (
-        Unsaved(editor.workspace, "quit", do, do),
+        Unsaved(editor.workspace, "quit", False, do, do),
         PictureOrMap("a picture with a long name, or a map.exr", do, do),
         SaveDialog(project, Path("folder/a.fluidwarp"), Preferences(), editor.chooser, do, None),
         Browser("Open", Path(__file__).parent, (".py",), do),

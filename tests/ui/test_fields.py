@@ -193,6 +193,30 @@ def test_a_picture_that_is_opened_begins_with_the_fluid_as_it_is_now(
     assert robot.editor.session.recipe.fluid.viscosity == 1.25
 
 
+def test_what_becomes_of_unsaved_work_is_told_as_it_is(
+    robot: Robot, widgets: Widgets, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Undo comes back to it where another picture is opened, but not where the window is closed."""
+    robot.drag((0.4, 0.5), (0.45, 0.5), steps=2)
+    robot.rest()
+    drawn, work = Drawn(monkeypatch, ()), robot.editor.session.recipe
+    robot.key("ctrl+q")
+    robot.frame(count=2)
+    assert " is lost if you quit without saving." in drawn.lines[-1] + drawn.lines[-2]
+    widgets.click("Cancel")
+    write_picture(tmp_path / "other.png", Picture(np.zeros((48, 64, 3), np.uint8)))
+    drawn.lines.clear()
+    robot.drop(tmp_path / "other.png")
+    said = {line.partition(" | ")[2] for line in drawn.lines if "not saved" in line}
+    assert len(said) == 1
+    assert said.pop().endswith(" is not saved. If you open other.png, Undo comes back to it until you quit.")
+    widgets.click("Don't save")
+    assert robot.editor.session.project.picture.width == 64
+    robot.key("ctrl+z")
+    robot.frame(count=2)
+    assert robot.editor.session.recipe == work
+
+
 @pytest.mark.parametrize(("then", "wanted"), [(None, 0.02), (0.3, 0.3)])
 def test_a_picture_that_is_opened_does_not_begin_with_what_a_fit_has_found(
     robot: Robot, widgets: Widgets, tmp_path: Path, then: float | None, wanted: float

@@ -298,7 +298,7 @@ def of_files(pressing: Pressing) -> Iterator[tuple[str, Callable[[], Dialog | No
         raise UserError(f"Cannot read {path.name}: it is empty")
 
     endings, take = (".png",), tell("taken")
-    yield "unsaved", lambda: show(Unsaved(editor.workspace, "quit", tell("save"), tell("then")))
+    yield "unsaved", lambda: show(Unsaved(editor.workspace, "quit", False, tell("save"), tell("then")))
     yield "picture or map", lambda: show(PictureOrMap("a.exr", tell("picture"), tell("map")))
     yield "open", lambda: show(Browser("Open", inside, endings, take))
     yield "save a new file", lambda: show(Browser("Save the mask", inside, endings, take, "new.png"))

@@ -15,6 +15,7 @@ import pytest
 from scipy import ndimage
 
 from app.media import project as projects
+from app.model.bars import bars
 from app.model.mask_edits import FillMask, PictureMask
 from app.model.picture import Picture
 from app.model.recipe import Recipe
@@ -484,10 +485,19 @@ def test_a_person_selects_freezes_and_renders_the_same(tmp_path: Path, fluidwarp
     assert not np.array_equal(rendered[..., :3], before)
 
 
-def test_the_selection_stands_above_the_handles_while_its_tool_is_in_hand(robot: Robot, widgets: Widgets) -> None:
+def test_the_section_of_the_tool_in_hand_stands_on_top(robot: Robot, widgets: Widgets) -> None:
+    """That of handles is below all else with another tool: what is said in it, and then not, moves nothing else."""
     robot.key("g")
     robot.drag((0.4, 0.5), (0.4, 0.5), steps=1)
     robot.rest()
+    assert widgets.at["Handles and pins"].y < widgets.at["Fluid"].y
+    robot.key("p")
+    robot.frame(count=2)
+    assert widgets.at["Statistics"].y < widgets.at["Handles and pins"].y
     robot.key("m")
     robot.frame(count=2)
-    assert widgets.at["Selection"].y < widgets.at["Handles and pins"].y < widgets.at["Fluid"].y
+    assert widgets.at["Selection"].y < widgets.at["Fluid"].y < widgets.at["Handles and pins"].y
+    robot.key("l")
+    robot.editor.state.lanes.selected = {bar.which for bar in bars(robot.editor.session.recipe)}
+    robot.frame(count=2)
+    assert widgets.at["Handles and pins"].y < widgets.at["Fluid"].y

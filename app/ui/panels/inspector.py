@@ -62,11 +62,15 @@ def draw(
 ) -> None:
     """All sections, one below the other."""
     session = workspace.session
+    handles = _about_handles(ui, workspace, state, do)
+    bars = _about_bars(ui, session, state)
+    # With another tool in hand it is below all else: what a push brings about in it moves nothing under the pointer.
+    is_in_hand = state.tool_name == "handle" or bool(bars)
     with ui.panel("inspector", rect, (16, 4), imgui.WindowFlags_.none), imgui_ctx.begin_child("sections"):
         for name, label, section, opened in (
             *_about_selection(ui, workspace, state, selecting, do),
-            *_about_handles(ui, workspace, state, do),
-            *_about_bars(ui, session, state),
+            *(handles if is_in_hand else []),
+            *bars,
             ("fluid", "Fluid", lambda: _fluid(ui, session, state), True),
             ("symmetry", "Symmetry", lambda: _symmetry(ui, state), False),
             ("view", "Overlays", lambda: _view(ui, state), True),
@@ -74,6 +78,7 @@ def draw(
             ("masks", "Masks and motion", lambda: _masks(ui, workspace, state, do), False),
             ("history", "History", lambda: _history(ui, workspace, state), True),
             ("numbers", "Statistics", lambda: _numbers(ui, session, state, clock, do), False),
+            *([] if is_in_hand else handles),
         ):
             state.sections[name] = ui.section(label, state.sections.get(name, opened))
             if state.sections[name]:
