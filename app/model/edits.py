@@ -25,7 +25,7 @@ ROOM = (100, 8 * LONGEST_GESTURE)
 
 
 def cut_off(recipe: Recipe, tick: int) -> Recipe:
-    """What of a recipe is done before a tick, and lasts until then."""
+    """What of a recipe is done before a tick, and lasts until then; what is set at it, the fluid is seen with there."""
     dt = recipe.fluid.dt
     handles = [before for handle in recipe.handle if (before := handle.before(tick, dt)) is not None]
     pins = [pin for pin in recipe.pin if pin.first_tick(dt) < tick]
@@ -38,7 +38,7 @@ def cut_off(recipe: Recipe, tick: int) -> Recipe:
         stroke=tuple(part for stroke in recipe.stroke for part in stroke.cut(tick)),
         handle=handles,
         pin=pins,
-        change=tuple(change for change in recipe.change if change.tick < tick),
+        change=tuple(kept for change in recipe.change if (kept := change.before(tick)) is not None),
         mask=tuple(edit for edit in recipe.mask if edit.tick <= tick),
         duration=max(tick, 1) * dt,
     )

@@ -389,3 +389,10 @@ class Change(Model):
     clear_velocity: bool = False
     reset_warp: bool = False
     clear_masks: bool = False
+
+    def before(self, tick: int) -> Self | None:
+        """What of it is in force when a tick begins: its settings at that tick too, but not what it does at once."""
+        if self.tick < tick:
+            return self
+        kept = type(self)(tick=self.tick, viscosity=self.viscosity, drag=self.drag, walls=self.walls)
+        return None if self.tick > tick or kept == type(self)(tick=tick) else kept

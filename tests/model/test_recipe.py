@@ -430,7 +430,7 @@ def test_what_is_cut_off_at_a_tick_is_what_was_passed_before_it():
     assert stroke.before(7) is stroke
 
 
-def test_of_each_list_what_is_done_before_a_tick_is_left_and_of_a_mask_what_is_done_at_it():
+def test_of_each_list_what_is_done_before_a_tick_is_left_and_of_a_mask_or_setting_what_is_done_at_it():
     """And all else of a recipe stays, but for how long it is."""
     text = 'name = "a"\nmap = "m.npy"\namount = 0.5\nfluid = { dt = 0.05, grid = 99 }\nstop = { energy_below = 1 }\n'
     text += '[[force]]\nkind = "point"\npoint = [0.5, 0.5]\ndirection = [1, 0]\n'
@@ -444,11 +444,26 @@ def test_of_each_list_what_is_done_before_a_tick_is_left_and_of_a_mask_what_is_d
         begins["mask"] += f'[[mask]]\nkind = "clear"\nof = "frozen"\ntick = {tick}\n'
     whole = Recipe.parse(text + "".join(begins.values()))
     cut = cut_off(whole, 3)
-    assert {key: len(getattr(cut, key)) for key in begins} == dict.fromkeys(begins, 1) | {"mask": 2}
-    assert (cut.change, cut.mask, cut.pin) == (whole.change[:1], whole.mask[:2], whole.pin[:1])
+    assert {key: len(getattr(cut, key)) for key in begins} == dict.fromkeys(begins, 1) | {"mask": 2, "change": 2}
+    assert (cut.change, cut.mask, cut.pin) == (whole.change[:2], whole.mask[:2], whole.pin[:1])
     assert cut.duration == pytest.approx(0.15)
     others = {key for key in Recipe.model_fields if key not in begins} - {"duration"}
     assert {key for key in others if getattr(cut, key) != getattr(whole, key)} == set()
+
+
+@pytest.mark.parametrize("setting", [{"viscosity": 0.5}, {"drag": 0.5}, {"walls": "no-slip"}])
+@pytest.mark.parametrize("done", ["clear_velocity", "reset_warp", "clear_masks"])
+def test_of_a_change_at_the_tick_where_one_goes_on_the_settings_stay_and_what_it_does_goes(
+    setting: dict[str, Any], done: str
+) -> None:
+    """The fluid is shown as it is set there, and the picture as it was before it was reset."""
+    set_only, done_only = (Change.model_validate({"tick": 4} | what) for what in (setting, {done: True}))
+    whole = Recipe(duration=9.0, change=(set_only.model_copy(update={done: True}),))
+    assert cut_off(whole, 5).change == whole.change
+    assert cut_off(whole, 4).change == (set_only,)
+    assert cut_off(whole, 4).fluid_at(4) == whole.fluid_at(4)
+    assert cut_off(whole, 3).change == ()
+    assert cut_off(Recipe(duration=9.0, change=(done_only,)), 4).change == ()
 
 
 def test_what_a_reset_lets_go_of_is_held_again_where_the_reset_is_cut_off():

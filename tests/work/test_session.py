@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import pairwise, product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -1286,3 +1287,24 @@ def test_whatever_is_done_while_a_gesture_is_open_is_done_as_if_it_had_been_ende
         open_, ended = (after(act, ends) for ends in (False, True))
         for number, (one, other) in enumerate(zip(open_, ended, strict=True)):
             assert one == other, (name, number)
+
+
+@pytest.mark.parametrize("setting", [{"drag": 1.0}, {"viscosity": 0.5}, {"walls": "no-slip"}])
+def test_what_is_set_at_the_tick_where_one_goes_back_and_paints_stays(
+    session: Session, setting: dict[str, Any]
+) -> None:
+    """The fluid was shown as it is set there, and then painted on as it had been before."""
+    paint(session, "push", (0.3, 0.5), (0.4, 0.5), ticks=2)
+    session.stop_recording()
+    tick = session.next_tick
+    session.change("Fluid", **setting)
+    session.stop_recording()
+    paint(session, "push", (0.3, 0.6), (0.4, 0.6), ticks=2)
+    session.stop_recording()
+    session.seek(tick)
+    shown = session.recipe.fluid_at(session.next_tick)
+    assert {name: getattr(shown, name) for name in setting} == setting
+    paint(session, "push", (0.6, 0.5), (0.5, 0.5), ticks=2)
+    assert session.recipe.stroke[-1].first_tick == tick
+    assert len(session.recipe.stroke) == 2
+    assert session.recipe.fluid_at(tick) == shown
