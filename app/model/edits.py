@@ -44,6 +44,13 @@ def cut_off(recipe: Recipe, tick: int) -> Recipe:
     )
 
 
+def ending_at(recipe: Recipe, tick: int) -> Recipe:
+    """A recipe that ends at a tick; at 0, before anything has acted, by one in which nothing does."""
+    if tick == 0:
+        recipe = cut_off(recipe, 0).edited(force=())
+    return recipe.edited(duration=max(tick, 1) * recipe.fluid.dt)
+
+
 def with_made(recipe: Recipe, made: Made, ticks: int, taken: int | None = None) -> Recipe:
     """A recipe with what a gesture has made, and so many ticks; `taken` is the number of the handle in hand."""
     duration = ticks * recipe.fluid.dt

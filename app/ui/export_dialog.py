@@ -27,6 +27,7 @@ from app.media.leftovers import temporary_folder
 from app.media.numbered import is_sequence, is_there
 from app.media.pictures import read_picture
 from app.media.project import check_pictures_kept
+from app.model.edits import ending_at
 from app.model.handles import heading
 from app.model.timeline import NEARLY, Sentinel, Timeline, steps_of
 from app.ui.canvas import shown_pixels
@@ -165,7 +166,7 @@ class ExportDialog(Dialog):
         recipe = session.document.recipe
         if not self.animation:
             # The picture that is seen: the warp at the playhead.
-            recipe = recipe.edited(duration=max(session.target, 1) * recipe.fluid.dt)
+            recipe = ending_at(recipe, session.target)
         grid = min(recipe.fluid.grid * FINER[choices.finer][1], 1024)
         own = max(self.picture.width, self.picture.height)
         output = recipe.output.model_copy(
@@ -526,11 +527,8 @@ class Exports:
         check()
         if self.is_running:
             raise UserError("An export is still running; copy the picture when that is finished.")
-        recipe = session.document.recipe
-        recipe = recipe.edited(
-            duration=max(session.target, 1) * recipe.fluid.dt,
-            output=recipe.output.model_copy(update={"size": None}),
-        )
+        recipe = ending_at(session.document.recipe, session.target)
+        recipe = recipe.edited(output=recipe.output.model_copy(update={"size": None}))
         folder = temporary_folder()
         outputs = Outputs(Path(folder.name) / "the picture.png", bits=8, recorded=False)
         picture = replace(session.project.picture, note="")

@@ -24,6 +24,7 @@ from app.ui import clipboard
 from app.ui.preferences import Preferences
 from app.ui.saving import SaveDialog
 from app.work.jobs import Job
+from app.work.replay import Replay
 from solver.gl.device import Device
 from support.commands import Run
 from support.desk import Desk, needs_a_screen
@@ -177,11 +178,14 @@ class Asked:
 def test_what_is_copied_or_exported_at_any_moment_is_a_recipe_that_can_be_read_again(
     robot: Robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, tick: int, way: str
 ) -> None:
-    """Also at the start: none lasts less than a step."""
+    """And of what is seen, also at the start: no recipe lasts less than a step, and in none does anything act there."""
     monkeypatch.setitem(sys.modules, "copykitten", Board())
     monkeypatch.setattr("app.ui.export_dialog.ExportProcess", Asked)
-    editor, whirl = robot.editor, "[[force]]\nkind = 'vortex'\npoint = [0.5, 0.5]"
-    editor.session.edit("Whirl", force=Recipe.parse(whirl).force, duration=5 * editor.session.dt)
+    editor, acts = robot.editor, "[[force]]\nkind = 'vortex'\npoint = [0.5, 0.5]\n"
+    acts += "[[stroke]]\ntool = 'push'\nsamples = [[0, 0.3, 0.3, 1], [3, 0.4, 0.3, 1]]\n"
+    made = Recipe.parse(acts + "[[handle]]\nat = [0.7, 0.7]\nto = [0.8, 0.7]")
+    parts = {"force": made.force, "stroke": made.stroke, "handle": made.handle}
+    editor.session.edit("Whirl", **parts, duration=5 * editor.session.dt)
     robot.rest()
     editor.session.seek(tick)
     robot.rest()
@@ -192,6 +196,13 @@ def test_what_is_copied_or_exported_at_any_moment_is_a_recipe_that_can_be_read_a
         job = Asked.jobs.pop()
     assert job.recipe.ticks == max(tick, 1)
     assert Recipe.parse(job.recipe.text()) == job.recipe
+    replay = Replay(editor.session.device, job.recipe, editor.session.pictures)
+    replay.seek(job.recipe.ticks)
+    seen, made_again = editor.session.replay.warp.read(), replay.warp.read()
+    replay.release()
+    assert editor.session.tick == tick
+    assert np.array_equal(seen, made_again)
+    assert seen.any() == (tick > 0)
 
 
 def test_a_copy_that_is_stopped_is_on_no_clipboard_and_leaves_nothing(
