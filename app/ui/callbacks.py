@@ -16,6 +16,8 @@ NAMED = {
     glfw.KEY_RIGHT: "right", glfw.KEY_UP: "up", glfw.KEY_DOWN: "down", glfw.KEY_HOME: "home", glfw.KEY_END: "end",
     glfw.KEY_PAGE_UP: "pageup", glfw.KEY_PAGE_DOWN: "pagedown",
 } | {getattr(glfw, f"KEY_F{number}"): f"f{number}" for number in range(1, 13)}  # fmt: skip
+CONTROL = glfw.MOD_CONTROL, glfw.KEY_LEFT_CONTROL, glfw.KEY_RIGHT_CONTROL
+COMMAND = glfw.MOD_SUPER, glfw.KEY_LEFT_SUPER, glfw.KEY_RIGHT_SUPER
 
 
 class Callbacks:
@@ -93,14 +95,17 @@ def _is_dragging(handle: Any) -> bool:
 
 
 def _mods(bits: int) -> Mods:
-    ctrl = glfw.MOD_SUPER if sys.platform == "darwin" else glfw.MOD_CONTROL
-    return Mods(bool(bits & ctrl), bool(bits & glfw.MOD_SHIFT), bool(bits & glfw.MOD_ALT))
+    return Mods(bool(bits & _control()[0]), bool(bits & glfw.MOD_SHIFT), bool(bits & glfw.MOD_ALT))
 
 
 def _with_own(mods: Mods, key: int, action: int) -> Mods:
-    down = action != glfw.RELEASE
     own = {
         glfw.KEY_LEFT_ALT: "alt", glfw.KEY_RIGHT_ALT: "alt", glfw.KEY_LEFT_SHIFT: "shift",
-        glfw.KEY_RIGHT_SHIFT: "shift", glfw.KEY_LEFT_CONTROL: "ctrl", glfw.KEY_RIGHT_CONTROL: "ctrl",
+        glfw.KEY_RIGHT_SHIFT: "shift", **dict.fromkeys(_control()[1:], "ctrl"),
     }.get(key)  # fmt: skip
-    return replace(mods, **{own: down}) if own else mods
+    return replace(mods, **{own: action != glfw.RELEASE}) if own else mods
+
+
+def _control() -> tuple[int, int, int]:
+    """The bit and the keys of what is called ctrl: on macOS, Command."""
+    return COMMAND if sys.platform == "darwin" else CONTROL

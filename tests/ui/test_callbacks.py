@@ -18,12 +18,8 @@ KEYS = {
     "delete": "DELETE", "left": "LEFT", "right": "RIGHT", "up": "UP", "down": "DOWN", "home": "HOME", "end": "END",
     "pageup": "PAGE_UP", "pagedown": "PAGE_DOWN",
 } | {f"f{n}": f"F{n}" for n in range(1, 13)} | {str(digit): str(digit) for digit in range(10)}  # fmt: skip
-OWN = {
-    "LEFT_ALT": "alt", "RIGHT_ALT": "alt", "LEFT_SHIFT": "shift", "RIGHT_SHIFT": "shift", "LEFT_CONTROL": "ctrl",
-    "RIGHT_CONTROL": "ctrl",
-}  # fmt: skip
-CTRL = glfw.MOD_SUPER if sys.platform == "darwin" else glfw.MOD_CONTROL
-BITS = {"shift": glfw.MOD_SHIFT, "alt": glfw.MOD_ALT, "ctrl": CTRL}
+CTRL = "SUPER" if sys.platform == "darwin" else "CONTROL"
+BITS = {"shift": glfw.MOD_SHIFT, "alt": glfw.MOD_ALT, "ctrl": getattr(glfw, f"MOD_{CTRL}")}
 HELD = [dict(zip(BITS, held, strict=True)) for held in product((False, True), repeat=3)]
 
 
@@ -41,13 +37,24 @@ def test_each_key_has_its_name_and_the_modifiers_that_are_held(held: dict[str, b
                 wanted.append(Key(name, action != glfw.RELEASE, Mods(**held), action == glfw.REPEAT))
     heard.key(glfw.KEY_Y, glfw.PRESS, bits(held), "Z")  # as a German layout prints it
     wanted.append(Key("z", True, Mods(**held)))
-    for key, own in OWN.items():
-        for action in (glfw.PRESS, glfw.RELEASE):
-            heard.key(getattr(glfw, f"KEY_{key}"), action, bits(held))
-            wanted.append(Key("", action == glfw.PRESS, Mods(**held | {own: action == glfw.PRESS})))
-            assert heard.held == Mods(**held | {own: action == glfw.PRESS})
     assert heard.take() == wanted
     assert heard.take() == []
+
+
+@pytest.mark.parametrize(("platform", "control"), [("linux", "CONTROL"), ("win32", "CONTROL"), ("darwin", "SUPER")])
+def test_a_modifier_is_held_from_its_own_event_on(platform: str, control: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "platform", platform)
+    names = {"SHIFT": "shift", "ALT": "alt", "CONTROL": None, "SUPER": None} | {control: "ctrl"}
+    heard = Callbacks()
+    for name, side, before in product(names, ("LEFT", "RIGHT"), product((False, True), repeat=4)):
+        held = dict(zip(names, before, strict=True))
+        for action in (glfw.PRESS, glfw.RELEASE):
+            before_it = sum(getattr(glfw, f"MOD_{one}") for one in held if held[one])
+            heard.key(getattr(glfw, f"KEY_{side}_{name}"), action, before_it)
+            then = held | {name: action == glfw.PRESS}
+            mods = Mods(**{own: then[one] for one, own in names.items() if own})
+            assert heard.held == mods
+            assert heard.take() == [Key("", action == glfw.PRESS, mods)]
 
 
 def test_all_keys_that_do_something_have_a_name() -> None:
