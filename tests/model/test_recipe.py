@@ -328,6 +328,27 @@ def test_a_recording_is_as_long_as_its_recipe_once_anything_is_done_in_it(key: s
     assert Recipe.model_validate({"duration": 2.0} | still).recorded == 0
 
 
+@pytest.mark.parametrize(
+    ("key", "part", "begins"),
+    [
+        ("stroke", {"tool": "push", "samples": ((3, 0.1, 0.1, 1.0),)}, 3),
+        ("stroke", {"tool": "push", "samples": ((3, 0.1, 0.1, 1.0),), "muted": True}, 9),
+        ("change", {"tick": 3, "drag": 1.0}, 3),
+        ("mask", {"kind": "invert", "tick": 3, "of": "frozen"}, 3),
+        ("handle", {"at": (0.5, 0.5), "to": (0.6, 0.5), "start": 0.05}, 3),
+        ("pin", {"at": (0.5, 0.5), "start": 0.05}, 3),
+        ("force", {"kind": "vortex", "point": (0.5, 0.5)}, 0),
+        ("freeze", {"kind": "picture"}, 0),
+    ],
+)
+def test_a_recipe_begins_where_the_first_of_its_parts_does(key: str, part: dict[str, object], begins: int):
+    """Time before that is passed over. A force may act, and a mask of the picture's is laid, from the first tick on."""
+    stroke = {"tool": "push", "samples": ((9, 0.1, 0.1, 1.0),)}
+    assert Recipe.model_validate({"stroke": (stroke,)}).begins == 9
+    parts = {"stroke": (stroke,), key: (part, stroke) if key == "stroke" else (part,)}
+    assert Recipe.model_validate(parts).begins == begins
+
+
 def test_a_mark_before_the_text_is_read_over(tmp_path: Path):
     """As Windows' Notepad sets it."""
     (tmp_path / "a.toml").write_text("duration = 2.0\n", "utf-8-sig")

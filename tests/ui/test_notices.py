@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Callable
 from datetime import date, datetime
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
+
+import pytest
 
 from app.media.opening import shipped_recipes
 from app.model.recipe import Recipe
@@ -129,3 +133,13 @@ def test_folders_are_listed_before_files(tmp_path: Path) -> None:
         (tmp_path / name).touch()
     browser = Browser("Open", tmp_path, (".png",), lambda path: None)
     assert [path.name for path in browser.inside] == ["b", "D", "A.png", "c.png"]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="names are texts elsewhere")
+def test_names_that_are_no_texts_are_shown_in_a_browser_as_far_as_they_can_be(tmp_path: Path) -> None:
+    """No field could show them otherwise."""
+    folder = tmp_path / os.fsdecode(b"caf\xe9")
+    folder.mkdir()
+    browser = Browser("Save the mask", folder, (".png",), lambda path: None, os.fsdecode(b"th\xe9.png"))
+    assert (browser.typed, browser.name) == (str(tmp_path / "caf?"), "th?.png")
+    assert browser.folder == folder
