@@ -269,11 +269,20 @@ def test_a_box_selects_the_bars_that_it_touches(painted: Robot) -> None:
     assert lanes(painted).selected == {("stroke", 1)}
     painted.move(first.right - 2, first.y + 1)
     assert lanes(painted).selected == {("stroke", 0), ("stroke", 1)}
+    painted.move(second.x - 2, second.y + 1)  # smaller again
+    assert lanes(painted).selected == {("stroke", 1)}
+    painted.move(second.right + 10, second.y + 1)
+    assert lanes(painted).selected == set()
+    painted.move(second.x - 2, second.y + 1)
     painted.key("escape")
     assert lanes(painted).selected == set()
     painted.release()
     painted.click(*first.middle)
     draw(second.right - 2, shift=True)
+    assert lanes(painted).selected == {("stroke", 0), ("stroke", 1)}
+    painted.move(second.right + 10, second.y + 1)
+    assert lanes(painted).selected == {("stroke", 0)}
+    painted.move(second.right - 2, second.y + 1)
     painted.release()
     assert lanes(painted).selected == {("stroke", 0), ("stroke", 1)}
     assert len(names(painted)) == 3  # nothing of which was an edit
