@@ -226,6 +226,27 @@ def test_a_click_selects_what_is_like_it(robot: Robot, widgets: Widgets, by: str
     assert (edit.at is None) == (by == "colour")
 
 
+def test_on_a_warped_picture_what_is_like_is_what_is_seen_at_the_place(robot: Robot) -> None:
+    """Where something else has been pushed to, and where it has been pushed away from."""
+    robot.key("p")
+    robot.drag((0.1, 0.5), (0.4, 0.5), steps=8)
+    robot.rest()
+    robot.key("m")
+    moved = robot.editor.session.replay.warp.read((WIDTH, HEIGHT)) * WIDTH
+    rows, columns = (np.rint(at + moved[..., axis]).astype(int) for axis, at in ((1, Y), (0, X)))
+    seen = (BLOB | SPOT)[np.clip(rows, 0, HEIGHT - 1), np.clip(columns, 0, WIDTH - 1)]
+    for reddish in (True, False):
+        changed = (seen == reddish) & ((BLOB | SPOT) != reddish)
+        inside = ndimage.distance_transform_cdt(changed)
+        row, column = np.unravel_index(int(np.argmax(inside)), inside.shape)
+        assert inside[row, column] > 3
+        robot.editor.state.connected = False
+        select(robot, "colour", ((float(column) + 0.5) / WIDTH, (float(row) + 0.5) / HEIGHT))
+        robot.key("enter")
+        assert is_like(np.asarray(ndimage.median_filter(frozen(robot), 7)), seen == reddish, 0.9)
+        robot.key("ctrl+z")
+
+
 def test_a_subject_is_found_in_a_rough_box_while_frames_go_on(robot: Robot) -> None:
     robot.editor.state.select_by = "subject"
     robot.drag((0.1, 0.15), (0.6, 0.85))
