@@ -1236,6 +1236,7 @@ def test_frames_from_any_number_on_are_those_of_the_whole_and_can_be_cancelled(t
         for (_, one), (_, other) in zip(found, whole[first:], strict=True):
             assert np.array_equal(one.pixels, other.pixels)
         for ways in (clip.pictures((clip.start + first, None), cancel=lambda: True),
+                     clip.pictures((clip.start + first, None), lambda number: True, lambda: True),  # all are kept
                      clip.pictures_from(clip.start + first, cancel=lambda: True)):  # fmt: skip
             with pytest.raises(Cancelled):
                 list(ways)
