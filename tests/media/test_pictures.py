@@ -962,6 +962,18 @@ def test_profile_and_metadata_are_kept_or_stripped(tmp_path: Path, ending: str):
     assert not stripped.texts
 
 
+@pytest.mark.parametrize(
+    ("name", "held"), [("Ö", "Ö"), ("α", "?"), ("α to ω", "? to ?"), ("x" * 80, "x" * 79), ("α" * 80, "?" * 79)]
+)
+def test_a_text_whose_name_no_png_can_have_has_one_that_it_can(tmp_path: Path, name: str, held: str):
+    """A name is 1 to 79 letters of Latin-1."""
+    write_picture(tmp_path / "a.png", Picture(smooth(3), texts={name: "said"}))
+    with Image.open(tmp_path / "a.png") as image:  # another program's view
+        assert isinstance(image, PngImagePlugin.PngImageFile)
+        assert image.text == {held: "said"}
+    assert dict(read_picture(tmp_path / "a.png").texts) == {held: "said"}
+
+
 @pytest.mark.parametrize("ending", ["avif", "jpg", "png", "tif", "webp"])
 def test_a_resolution_that_is_asked_for_stands_in_the_file_and_in_its_exif(tmp_path: Path, ending: str):
     exif = Image.Exif()
