@@ -89,6 +89,19 @@ def test_what_is_played_ends_as_the_still_and_as_a_replay(studio: Studio) -> Non
     replay.release()
 
 
+def test_what_is_played_is_written_under_the_name_of_its_recipe_or_another(studio: Studio) -> None:
+    """Variants of one stand beside each other."""
+    recipe = load("figure-5")
+    short = {"duration": 2 * recipe.fluid.dt, "fluid": recipe.fluid.model_copy(update={"grid": 32})}
+    results = {"figure-5": studio.play("figure-5", **short).result}
+    results["other"] = studio.play("figure-5", save_as="other", force=(), **short).result
+    assert not np.array_equal(*results.values())
+    files = {f"{name}.{ending}" for name in results for ending in ("png", "mp4")}
+    assert {path.name for path in studio.folder.iterdir()} == files
+    for name, result in results.items():
+        assert np.array_equal(read_picture(studio.folder / f"{name}.png").pixels, result)
+
+
 @pytest.mark.parametrize("name", sorted(name for name in {*FIGURES, *BESIDES} if not name.startswith("handles")))
 def test_every_recipe_can_be_read_and_its_forces_built_without_notices(name: str) -> None:
     from app.model.forces import build
