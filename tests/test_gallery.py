@@ -78,8 +78,11 @@ def test_what_is_played_ends_as_the_still_and_as_a_replay(studio: Studio) -> Non
     recipe = load("figure-5")
     short = {"duration": 2 * recipe.fluid.dt, "fluid": recipe.fluid.model_copy(update={"grid": 32})}
     seen: list[np.ndarray] = []
-    played = studio.play("figure-5", watch=lambda replay, frame: seen.append(frame), **short)
+    stills = [tick * recipe.fluid.dt for tick in range(3)]
+    played = studio.play("figure-5", stills, watch=lambda replay, frame: seen.append(frame), **short)
     assert np.array_equal(seen[-1], played.result)
+    assert [*played.stills] == stills
+    assert all(map(np.array_equal, played.stills.values(), (played.source, *seen)))
     assert len(seen) == 2
     assert np.array_equal(played.result, studio.still(recipe.edited(**short)))
     replay = Replay(studio.device, played.recipe, Pictures(Picture(played.source), recipes_folder()))

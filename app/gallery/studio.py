@@ -81,7 +81,7 @@ class Studio:
         recipe = load(name).edited(**parts)
         source = source_of(recipe)
         ticks = {round(time / recipe.fluid.dt): time for time in stills}
-        kept: dict[float, np.ndarray] = {}
+        kept = {time: source for tick, time in ticks.items() if tick == 0}
         frame = source
         label = save_as or name
 
