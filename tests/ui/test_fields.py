@@ -153,6 +153,40 @@ def test_a_grid_far_finer_than_the_picture_is_told_where_it_is_chosen(
             assert [words for words in said if words.startswith("A grid of")] == grids
 
 
+class Finished:
+    """An export that is done at once: all of it is magenta."""
+
+    is_done, part, error = True, 1.0, ""
+    shape = (1, 1)  # height and width
+
+    def __init__(self, job: Job) -> None:
+        self.job = job
+        write_picture(job.target, Picture(np.tile(np.array([255, 0, 255], np.uint8), (*self.shape, 1))))
+
+    def poll(self, *heard: object) -> None: ...
+    def stop(self, then: object = None) -> None: ...
+
+
+@pytest.mark.parametrize("shape", [(300, 60), (60, 300)])
+def test_the_preview_of_an_export_has_the_sides_of_the_picture(
+    robot: Robot, widgets: Widgets, tmp_path: Path, shape: tuple[int, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As wide as the dialog, unless it is too high for that."""
+    monkeypatch.setattr(Finished, "shape", shape)
+    monkeypatch.setattr("app.ui.export_dialog.ExportProcess", Finished)
+    dialog = export_dialog(robot, tmp_path)
+    dialog.choices.finer = 1
+    robot.editor.dialogs.show(dialog)
+    robot.frame(count=3)
+    widgets.click("Preview")
+    robot.frame(count=5)
+    robot.see()
+    rows, columns = np.nonzero((robot.pixels() == (255, 0, 255)).all(axis=2))
+    height, width = np.ptp(rows) + 1, np.ptp(columns) + 1
+    assert height >= 60
+    assert width / height == pytest.approx(shape[1] / shape[0], rel=0.05)
+
+
 def test_the_middle_of_the_viscosity_is_that_of_its_decades(robot: Robot, widgets: Widgets) -> None:
     only(robot, "fluid")
     widgets.click("Viscosity")
