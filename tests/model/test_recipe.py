@@ -546,6 +546,33 @@ def test_recipes_agree_until_they_differ():
     assert recipe.agrees_until(Recipe.parse("[fluid]\ngrid = 64").edited(stroke=recipe.stroke)) == 0
 
 
+@pytest.mark.parametrize(
+    ("keys", "agreed"),
+    [
+        ({"during": (0.51, 2.01)}, 60),  # it ends later, after 1.01 s
+        ({"during": (0.51, 0.81)}, 48),  # or earlier
+        ({"during": (0.26, 1.01)}, 15),
+        ({"during": (0.76, 1.01)}, 30),
+        ({"during": (0.51, 2.01), "strength": 2.0}, 30),
+        ({"strength": 2.0}, 30),
+        ({"muted": True}, 30),
+        ({"muted": True, "during": (0.26, 1.01)}, 30),
+        ({"during": None, "at": (0.26,)}, 15),
+        ({"during": None}, 0),
+    ],
+    ids=str,
+)
+def test_recipes_agree_until_a_force_differs(keys: dict[str, Any], agreed: int):
+    """Whichever of the two is asked; of one whose end alone is another, until the earlier of both."""
+    vortex = {"kind": "vortex", "point": (0.5, 0.5), "during": (0.51, 1.01)}
+    later = vortex | {"during": (5.0, 6.0)}
+    one, other = (Recipe.model_validate({"force": (force, later)}) for force in (vortex, vortex | keys))
+    assert one.agrees_until(other) == other.agrees_until(one) == agreed
+    mute = {"muted": True}
+    one, other = (Recipe.model_validate({"force": (force | mute, later)}) for force in (vortex, vortex | keys))
+    assert one.agrees_until(other) == math.inf
+
+
 @pytest.mark.parametrize("key", ["stroke", "force", "handle"])
 def test_recipes_of_which_one_has_an_equal_part_more_are_not_the_same(key: str):
     one, other = {
