@@ -753,6 +753,20 @@ def test_a_part_begins_with_the_nearest_stored_state(folder: Path, work: str, mo
     assert contents(folder / "again") == contents(folder / "whole")
 
 
+def test_another_process_takes_the_same_states(folder: Path):
+    """Python hashes texts otherwise in each."""
+    (folder / "b.toml").write_text(RECIPE)
+    assert part(folder, "one", 0, None, states=folder / "states")[1].error == ""
+    stored = {path.name for path in (folder / "states").iterdir()}
+    words = ["render", "b.toml", "p0.png", "-o", "two/f.%03d.png", "--states", "states"]
+    (folder / "two").mkdir()
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "PYTHONHASHSEED": "1"}
+    subprocess.run([sys.executable, "-m", "app", *words], cwd=folder, env=environment, check=True)
+    assert stored
+    assert {path.name for path in (folder / "states").iterdir()} == stored
+    assert contents(folder / "one") == contents(folder / "two")
+
+
 def test_states_of_something_else_are_not_taken(folder: Path, monkeypatch: pytest.MonkeyPatch):
     """Another recipe, another picture, another grid, a damaged file, one under another's name."""
     monkeypatch.setattr(states, "EVERY", 2)
