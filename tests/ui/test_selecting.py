@@ -236,8 +236,8 @@ def test_on_a_warped_picture_what_is_like_is_what_is_seen_at_the_place(robot: Ro
     rows, columns = (np.rint(at + moved[..., axis]).astype(int) for axis, at in ((1, Y), (0, X)))
     seen = (BLOB | SPOT)[np.clip(rows, 0, HEIGHT - 1), np.clip(columns, 0, WIDTH - 1)]
     for reddish in (True, False):
-        changed = (seen == reddish) & ((BLOB | SPOT) != reddish)
-        inside = ndimage.distance_transform_cdt(changed)
+        changed = (seen == reddish) & (seen != (BLOB | SPOT))
+        inside = np.asarray(ndimage.distance_transform_cdt(changed))
         row, column = np.unravel_index(int(np.argmax(inside)), inside.shape)
         assert inside[row, column] > 3
         robot.editor.state.connected = False
