@@ -1714,6 +1714,22 @@ def test_slow_painting_is_answered_by_a_coarser_grid_which_is_no_edit(measured: 
     assert not measured.editor.workspace.is_dirty
 
 
+def test_nothing_is_tried_ahead_while_another_grid_is_prepared(measured: Robot) -> None:
+    """Each would only take the time of the other."""
+    quality, rehearsal, frames = measured.editor.quality, measured.editor.rehearsal, 0
+    measured.editor.session.begin_with(grid=128)
+    paint_at(measured, 0.1, ENOUGH)
+    rehearsal.has_news = lambda: False
+    measured.until(lambda: quality.is_preparing)
+    while quality.is_preparing:
+        assert rehearsal.trial is None
+        measured.frame()
+        frames += 1
+    assert frames > 1
+    measured.frame()
+    assert rehearsal.trial is not None
+
+
 def test_the_grid_is_finer_again_where_there_is_time(measured: Robot) -> None:
     measured.editor.session.begin_with(grid=128, dt=1 / 60, viscosity=0.3, drag=0.0)  # which halts with the brush
     paint_at(measured, 0.1, ENOUGH)

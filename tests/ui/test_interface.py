@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
 import re
+import threading
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
@@ -18,6 +21,7 @@ from imgui_bundle import imgui
 from app.media.displacement import Displacement
 from app.media.maps import write_map
 from app.media.pictures import write_picture
+from app.media.project import Project
 from app.model.handles import RecipeHandle
 from app.model.masks import PathFreeze
 from app.model.picture import Picture
@@ -39,7 +43,7 @@ from app.ui.viewport import Rect
 from app.ui.widgets import Ui, fitting
 from solver.gl.device import Device
 from solver.gl.passes import Pass
-from support.editing import BY_KEY, Robot, export_dialog, pattern, small_project
+from support.editing import BY_KEY, Robot, Still, export_dialog, pattern, small_project
 from support.widgets import Widgets
 
 
@@ -161,6 +165,97 @@ def test_frames_are_drawn_for_a_pointer_that_rests_only_where_something_may_come
         robot.frame(count=FRAMES, dt=0.01)
         assert robot.editor.clock.hovering
         assert robot.editor.wait() == wait
+
+
+@contextmanager
+def exporting(robot: Robot, folder: Path, patched: pytest.MonkeyPatch) -> Iterator[None]:
+    patched.setattr("app.ui.export_dialog.ExportProcess", Still)
+    robot.editor.exports.start(export_dialog(robot, folder).job())
+    yield
+    robot.editor.exports.cancel()
+
+
+@contextmanager
+def a_fit(robot: Robot, folder: Path, patched: pytest.MonkeyPatch) -> Iterator[None]:
+    patched.setattr("app.ui.fitting.FitProcess", Still)
+    led = RecipeHandle(at=(0.4, 0.5), to=(0.45, 0.5), duration=0.05)
+    robot.editor.session.edit("Handle", handle=(led,), duration=0.1)
+    robot.editor.session.settle()
+    robot.editor.fits.start()
+    yield
+    robot.editor.fits.give_up()
+
+
+@contextmanager
+def a_file_that_is_opened(robot: Robot, folder: Path, patched: pytest.MonkeyPatch) -> Iterator[None]:
+    done, project = threading.Event(), robot.editor.session.project
+
+    def load() -> Project:
+        done.wait(60)
+        return project
+
+    robot.editor.files.read(folder / "slow.png", load)
+    yield
+    robot.editor.files.give_up_loading()
+    done.set()
+
+
+@contextmanager
+def a_preview(robot: Robot, folder: Path, patched: pytest.MonkeyPatch) -> Iterator[None]:
+    patched.setattr("app.ui.export_dialog.ExportProcess", Still)
+    dialog = export_dialog(robot, folder)
+    dialog.choices.finer = 1
+    robot.editor.dialogs.show(dialog)
+    Widgets(robot, patched).click("Preview")
+    robot.move(2, 2)
+    yield
+    dialog.close()
+    robot.frame()
+
+
+@contextmanager
+def a_dialog_of_the_system(robot: Robot, folder: Path, patched: pytest.MonkeyPatch) -> Iterator[None]:
+    (folder / "zenity").write_text(f"#!/bin/sh\nwhile [ ! -e {folder}/done ]; do sleep 0.02; done\n")
+    (folder / "zenity").chmod(0o755)
+    patched.setenv("PATH", f"{folder}:{os.environ['PATH']}")
+    robot.editor.chooser.native = True
+    robot.key("ctrl+o")
+    yield
+    (folder / "done").touch()
+    robot.until(lambda: not robot.editor.chooser.is_waiting)
+    robot.editor.dialogs.shown[-1].close()  # ours, as that one had no answer
+    robot.frame()
+
+
+ELSEWHERE = (exporting, a_fit, a_file_that_is_opened, a_preview, a_dialog_of_the_system)
+
+
+@pytest.mark.parametrize("work", ELSEWHERE, ids=lambda work: work.__name__)
+def test_what_goes_on_elsewhere_is_looked_at_ten_times_a_second(
+    robot: Robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, work: Callable[..., AbstractContextManager[None]]
+) -> None:
+    robot.move(*robot.at(0.5, 0.5))
+    with work(robot, tmp_path, monkeypatch):
+        robot.until(lambda: not robot.editor.wants_frame())
+        assert robot.editor.wait() == 0.1
+    robot.until(lambda: not robot.editor.wants_frame())
+    assert robot.editor.wait() > 1
+
+
+@pytest.mark.parametrize("work", ELSEWHERE[:3], ids=lambda work: work.__name__)
+def test_nothing_is_tried_ahead_while_another_process_or_thread_needs_the_machine(
+    robot: Robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, work: Callable[..., AbstractContextManager[None]]
+) -> None:
+    rehearsal = robot.editor.rehearsal
+    robot.move(*robot.at(0.5, 0.5))
+    with work(robot, tmp_path, monkeypatch):
+        robot.rest()
+        rehearsal.has_news = lambda: False
+        robot.frame(count=3)
+        assert rehearsal.is_wanted
+        assert rehearsal.trial is None
+    robot.frame()
+    assert rehearsal.trial is not None
 
 
 def test_a_message_stays_for_five_seconds(robot: Robot) -> None:
