@@ -18,6 +18,7 @@ from app.ui.preferences import Preferences
 from app.ui.widgets import Ui
 from solver.gl.device import Device
 from support.editing import Robot, add_bars, small_project
+from support.widgets import Widgets
 
 DOES = {
     "Load ...": "mask_load", "Save ...": "mask_save", "Invert": "mask_invert", "Fill": "mask_fill",
@@ -64,6 +65,50 @@ def test_every_button_does_what_stands_on_it(robot: Robot, monkeypatch: pytest.M
         state.choose_tool("select", False)
     assert {words: names for words, names in done.items() if names} == {words: [name] for words, name in DOES.items()}
     assert set(TOOL) <= done.keys()
+
+
+def rows_of_the_menu(robot: Robot, widgets: Widgets) -> dict[str, tuple[float, float]]:
+    """Its rows, and "recent", the one that opens another menu; the menu is open then."""
+    widgets.look()
+    robot.click(*next(widget.rect.middle for widget in widgets.drawn if widget.words == "menu"))
+    robot.frame(count=3)
+    rows = {widget.words: widget.rect.middle for widget in widgets.drawn if widget.kind == "menu_item"}
+    (x, above), (_, below) = rows["Open ..."], rows["Paste a picture"]
+    return rows | {"recent": (x, (above + below) / 2)}
+
+
+def test_every_row_of_the_menu_does_what_stands_on_it(
+    robot: Robot, widgets: Widgets, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    done, labels = list[str](), {action.label: name for name, action in ACTIONS.items()}
+    rows = rows_of_the_menu(robot, widgets)
+    robot.key("escape")
+    monkeypatch.setattr(robot.editor, "do", done.append)
+    assert len(rows) == 14
+    for words in rows.keys() - {"recent"}:
+        robot.click(*rows_of_the_menu(robot, widgets)[words])
+        robot.frame(count=2)
+        assert done == [labels[words]]
+        done.clear()
+
+
+@pytest.mark.parametrize("number", [0, 1])
+def test_what_was_open_is_opened_from_the_menu_and_told_where_it_is(
+    robot: Robot, widgets: Widgets, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int
+) -> None:
+    opened, told = list[Path](), list[str]()
+    files = tmp_path / "here" / "a.png", tmp_path / "there" / "b.fluidwarp"
+    robot.editor.preferences.recent = [str(file) for file in files]
+    monkeypatch.setattr(robot.editor.files, "open_work", opened.append)
+    monkeypatch.setattr(imgui, "set_tooltip", told.append)
+    robot.click(*rows_of_the_menu(robot, widgets)["recent"])
+    robot.frame(count=3)
+    row = next(widget.rect.middle for widget in widgets.drawn if widget.words == files[number].name)
+    robot.move(*row)
+    robot.frame(count=2)
+    assert set(told) == {str(files[number].parent)}
+    robot.click(*row)
+    assert opened == [files[number]]
 
 
 def test_what_an_action_sets_is_there_again_after_a_start(

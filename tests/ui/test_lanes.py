@@ -98,6 +98,45 @@ def test_a_bar_is_moved_by_dragging_it_and_escape_gives_that_up(painted: Robot) 
     assert recipe(painted).stroke[0].first_tick == 0  # and not before the beginning
 
 
+def test_the_playhead_follows_the_pointer_on_the_ruler_and_no_further_than_the_recording(painted: Robot) -> None:
+    session, scale = painted.editor.session, points_a_tick(painted)
+    first = place(painted, 1)
+    begins = recipe(painted).stroke[1].first_tick
+    rect = painted.editor.layout.lanes
+    assert rect is not None
+    y = place(painted, 0).y - 12  # above the bars
+    painted.move(first.x, y)
+    painted.press()
+    painted.frame()
+    assert session.target == begins
+    for ticks in (3, -5, 0):
+        painted.move(first.x + ticks * scale, y)
+        painted.frame()
+        assert session.target == begins + ticks
+    painted.move(rect.x - 50, y)
+    painted.frame()
+    assert session.target == 0
+    painted.move(rect.right + 50, y)
+    painted.frame()
+    assert session.target == session.length == session.end
+    painted.release()
+    painted.move(first.x, y)
+    painted.frame()
+    assert session.target == session.end
+
+
+def test_the_ruler_says_what_it_is_for_until_it_is_pressed(painted: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    painted.move(place(painted, 1).x, place(painted, 0).y - 12)
+    for pressed in (False, True):
+        if pressed:
+            painted.press()
+        with monkeypatch.context() as noting:
+            drawn = Drawn(noting)
+            painted.frame()
+        told = [line for line in drawn.take() if line.startswith("tooltip | The recording")]
+        assert bool(told) != pressed
+
+
 def test_there_is_room_for_more_lanes_where_their_edge_is_dragged(painted: Robot) -> None:
     before = painted.editor.layout.lanes
     assert before is not None
