@@ -53,6 +53,7 @@ from solver.gl.field import GraphicsMemoryError, new_texture
 from solver.resample.plan import Sampling
 from solver.resample.sampler import Sampler
 from support.commands import Run
+from support.drawn import Drawn
 from support.editing import BY_KEY, Robot, export_dialog, pattern, small_project, write_foreign_map
 from support.widgets import Widgets
 
@@ -953,6 +954,53 @@ def test_the_browser_asks_of_each_name_whether_it_may_be_replaced(robot: Robot, 
         robot.click(browser.rect.x + browser.rect.width - 24 - 44, browser.rect.y + browser.rect.height - 44)
         robot.frame(count=2)
     assert chosen == [tmp_path / "b.fluidwarp"]
+
+
+def test_a_folder_is_shown_by_a_double_click_and_of_one_that_is_gone_it_is_told(robot: Robot, tmp_path: Path) -> None:
+    (tmp_path / "deep" / "deeper").mkdir(parents=True)
+    robot.editor.chooser.ask_which("Open", tmp_path, (".pts",), lambda path: None)
+    robot.frame(count=2)
+    browser = robot.editor.dialogs.shown[-1]
+    assert isinstance(browser, Browser)
+
+    def twice(number: int) -> None:
+        robot.frame(dt=1.0)
+        for _ in range(2):
+            robot.click(browser.rect.x + 200, browser.rect.y + 110 + 34 * number)
+        robot.frame(count=2)
+
+    twice(0)
+    assert browser.folder == tmp_path / "deep"
+    assert browser.inside == [tmp_path / "deep" / "deeper"]
+    gone = tmp_path / "gone"
+    browser.go(gone)
+    with pytest.MonkeyPatch.context() as noting:
+        drawn = Drawn(noting)
+        robot.frame()
+    assert browser.inside == []
+    assert any(line.endswith("| No such file or directory") for line in drawn.take())
+    assert robot.editor.dialogs.shown == [browser]
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (UserError("a.png: it is torn; get it again"), "a.png: it is torn; get it again"),
+        (MemoryError(), "There is not enough memory to open {}."),
+        (RuntimeError("nobody has thought of it"), "{} cannot be opened: nobody has thought of it"),
+    ],
+)
+def test_whatever_fails_while_a_file_is_read_is_told_and_the_work_stays(
+    robot: Robot, tmp_path: Path, error: Exception, said: str
+) -> None:
+    def load() -> Project:
+        raise error
+
+    session = robot.editor.session
+    robot.editor.files.read(tmp_path / "a.png", load)
+    robot.until(lambda: not robot.editor.files.is_loading)
+    assert [message.text for message in robot.editor.messages.shown] == [said.format(tmp_path / "a.png")]
+    assert robot.editor.session is session
 
 
 def test_a_folder_that_is_not_there_is_told_in_the_browser(robot: Robot) -> None:

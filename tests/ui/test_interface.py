@@ -258,6 +258,53 @@ def test_nothing_is_tried_ahead_while_another_process_or_thread_needs_the_machin
     assert rehearsal.trial is not None
 
 
+def begin_to_select(robot: Robot) -> None:
+    robot.key("m")
+    robot.move(*robot.at(0.3, 0.3))
+    robot.press()
+    robot.move(*robot.at(0.4, 0.4))
+
+
+def select(robot: Robot) -> None:
+    begin_to_select(robot)
+    robot.release()
+
+
+def look_for_a_subject(robot: Robot) -> None:
+    robot.editor.state.select_by = "subject"
+    select(robot)
+    assert robot.editor.selecting.is_busy
+
+
+def select_a_bar(robot: Robot) -> None:
+    robot.key("l")
+    robot.frame(count=2)
+    robot.click(*robot.editor.state.lanes.drawn[0][1].middle)
+    robot.frame()
+    assert robot.editor.state.lanes.selected
+
+
+@pytest.mark.parametrize(
+    "begin", [begin_to_select, select, look_for_a_subject, select_a_bar], ids=lambda way: way.__name__
+)
+def test_escape_gives_up_what_is_in_hand_or_selected_and_only_the_next_one_stops_a_fit(
+    robot: Robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, begin: Callable[[Robot], None]
+) -> None:
+    finished = list[Still]()
+    monkeypatch.setattr(Still, "finish", lambda still: finished.append(still))
+    with a_fit(robot, tmp_path, monkeypatch):
+        begin(robot)
+        robot.key("escape")
+        assert finished == []
+        assert robot.editor.fits.is_running
+        state, selecting = robot.editor.state, robot.editor.selecting
+        assert not any((selecting.path, selecting.is_busy))
+        assert not any((state.selection, state.lanes.selected))
+        robot.release()
+        robot.key("escape")
+        assert len(finished) == 1
+
+
 def test_a_message_stays_for_five_seconds(robot: Robot) -> None:
     live(robot, 5)
     robot.key("ctrl+shift+c")

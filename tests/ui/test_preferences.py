@@ -93,6 +93,20 @@ def test_a_file_of_more_than_a_megabyte_is_none(file: Path) -> None:
     assert not Preferences.load().names
 
 
+def test_a_file_that_is_nested_deeper_than_can_be_read_is_none(file: Path) -> None:
+    file.write_text(f'{{"theme": "light", "keys": {"[" * 100_000}{"]" * 100_000}}}')
+    assert Preferences.load() == Preferences()
+
+
+def test_where_nothing_can_be_written_the_window_goes_on_and_leaves_nothing(tmp_path: Path) -> None:
+    (tmp_path / "fluidwarp").touch()  # where the folder would be
+    kept = Preferences(path=tmp_path / "fluidwarp" / "preferences.json")
+    kept.theme = "light"
+    kept.save()
+    assert kept.theme == "light"
+    assert [*tmp_path.iterdir()] == [tmp_path / "fluidwarp"]
+
+
 def test_what_is_opened_saved_or_exported_is_found_there_again(file: Path, tmp_path: Path) -> None:
     """What was pasted is no file to the person, and the program's own folder no place to save in."""
     opened, exported = tmp_path / "opened", tmp_path / "exported"

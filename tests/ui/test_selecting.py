@@ -251,8 +251,10 @@ def test_a_subject_is_found_in_a_rough_box_while_frames_go_on(robot: Robot) -> N
     robot.editor.state.select_by = "subject"
     robot.drag((0.1, 0.15), (0.6, 0.85))
     assert robot.editor.selecting.is_busy
+    assert robot.editor.selecting.hint == "Looking for the subject ..."
     assert robot.editor.wait() <= 0.1
     robot.until(lambda: not robot.editor.selecting.is_busy)
+    assert robot.editor.selecting.hint == ""
     robot.key("enter")
     assert is_like(frozen(robot), BLOB)
     assert "outline" in robot.editor.session.recipe.text()

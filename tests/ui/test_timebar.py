@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+from app.media.animation import animation_writer
 from app.ui.widgets import Ui
-from support.editing import Robot
+from support.editing import Robot, pattern
 
 Shown = tuple[str, str, bool]  # icon, title, enabled
+COMING = {"Click to play it once.": "once", "Click to play it in a loop.": "loop", "Click for ping-pong": "returns"}
 
 
 class Buttons:
@@ -54,3 +58,34 @@ def test_what_moves_can_be_stopped_and_what_rests_can_be_played(robot: Robot, bu
     assert buttons["play"] == playing
     robot.key("space")
     assert buttons["play"] == resting
+
+
+@pytest.mark.parametrize(("is_clip", "modes"), [(False, ["once", "loop", "returns"]), (True, ["once", "loop"])])
+def test_what_a_click_makes_of_how_it_is_played_is_what_is_told(
+    robot: Robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_clip: bool, modes: list[str]
+) -> None:
+    told, drawn, now = list[str](), Ui.icon_button, list[str]()
+
+    def noting(
+        ui: Ui, name: str, icon: str, title: str = "", key: str = "", more: str = "", *given: Any, **named: Any
+    ) -> bool:
+        if name == "repeat":
+            now[:], told[:] = [icon], [more]
+        return drawn(ui, name, icon, title, key, more, *given, **named)
+
+    if is_clip:
+        with animation_writer(tmp_path / "clip.apng", Fraction(5)) as write:
+            for _ in range(3):
+                write(pattern(96, 64).pixels)
+        robot.drop(tmp_path / "clip.apng")
+    monkeypatch.setattr(Ui, "icon_button", noting)
+    robot.frame()
+    seen = list[str]()
+    for _ in range(6):
+        seen += now
+        coming = next(mode for words, mode in COMING.items() if words in told[0])
+        robot.editor.do("repeat")
+        robot.frame()
+        assert now == [coming]
+    begun = modes.index(seen[0])
+    assert seen == [*modes, *modes, *modes, *modes][begun : begun + 6]
