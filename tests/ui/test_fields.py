@@ -24,6 +24,7 @@ from app.model.recipe import FluidSettings, Output, Recipe
 from app.model.strokes import BrushPath, Change, Stroke
 from app.model.tools import TOOL, BrushSettings, Press
 from app.progress import Progress
+from app.ui.browser import Browser
 from app.ui.editor_state import EditorState
 from app.ui.events import LEFT, Button, Move
 from app.ui.export_choices import ANIMATION, KINDS, MAP, PICTURE, PICTURES, PRESETS
@@ -38,7 +39,7 @@ from app.work.jobs import Job
 from solver.gl.device import Device
 from support.commands import Run
 from support.drawn import Drawn
-from support.editing import Robot, export_dialog, small_project
+from support.editing import Robot, Still, export_dialog, small_project
 from support.widgets import Widgets
 
 
@@ -357,6 +358,17 @@ def test_a_button_of_the_inspector_does_what_it_says(robot: Robot, widgets: Widg
     widgets.click(words)
     recipe = robot.editor.session.recipe
     assert recipe.change == (Change.model_validate({"tick": recipe.change[0].tick, name: True}),)
+
+
+def test_statistics_are_shown_and_the_hint_put_away_where_that_is_pressed(robot: Robot, widgets: Widgets) -> None:
+    only(robot, "numbers")
+    for shown in (True, False):
+        widgets.click("Show over the picture")
+        assert robot.editor.state.statistics is shown
+    robot.editor.preferences.hint = True
+    widgets.look()
+    robot.click(*next(widget.rect.middle for widget in widgets.drawn if widget.words == "no hint"))
+    assert robot.editor.preferences.hint is False
 
 
 def test_an_entry_of_the_history_is_the_one_that_is_pressed(robot: Robot) -> None:
@@ -857,6 +869,43 @@ def test_the_size_that_is_told_of_an_animation_is_the_one_that_is_written(
     file = next(tmp_path.glob(f"a*{Path(ending).suffix}"))
     assert iio.imread(file, index=0).shape[1::-1] == dialog.written
     assert (dialog.written == (61, 46)) == (ending != ".mp4")
+
+
+@pytest.mark.parametrize("fails", [False, True])
+def test_a_preview_is_shown_in_the_shape_of_the_picture_or_told_why_there_is_none(
+    robot: Robot, dialog: ExportDialog, widgets: Widgets, monkeypatch: pytest.MonkeyPatch, fails: bool
+) -> None:
+    dialog.choices.finer = 1
+    if fails:
+        failed = type("Failed", (Still,), {"is_done": True, "error": "it cannot be made"})
+        monkeypatch.setattr("app.ui.export_dialog.ExportProcess", failed)
+    widgets.click("Preview")
+    robot.until(lambda: not dialog.is_busy)
+    drawn, image = list[tuple[float, float]](), imgui.image
+    monkeypatch.setattr(imgui, "image", lambda texture, size: (drawn.append((size.x, size.y)), image(texture, size))[1])
+    robot.frame()
+    widgets.look()
+    assert ("Preview" in widgets.at) == fails
+    assert dialog.problem == ("it cannot be made" if fails else "")
+    assert [round(width / height, 3) for width, height in drawn[:1]] == [] if fails else [240 / 180]
+
+
+def test_where_the_person_browses_to_is_where_it_is_exported_and_under_which_name(
+    robot: Robot, dialog: ExportDialog, widgets: Widgets, tmp_path: Path
+) -> None:
+    """With the ending of the kind or without; another one is left to the kind."""
+    (tmp_path / "there").mkdir()
+    for name, taken in (("a.png", "a"), ("b", "b"), ("c.d.png", "c.d"), ("e.tif", "e")):
+        widgets.click("Browse")
+        browser = robot.editor.dialogs.shown[-1]
+        assert isinstance(browser, Browser)
+        browser.go(tmp_path / "there")
+        browser.name = name
+        robot.frame(count=2)
+        widgets.click("Export")  # of the browser, which is drawn last
+        assert robot.editor.dialogs.shown[-1] is dialog
+        assert (dialog.folder, dialog.name) == (tmp_path / "there", taken)
+        assert dialog.output == tmp_path / "there" / f"{taken}.png"
 
 
 def test_a_name_that_is_proposed_goes_with_the_kind(dialog: ExportDialog, widgets: Widgets) -> None:

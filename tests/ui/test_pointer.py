@@ -227,3 +227,27 @@ def test_a_tap_of_space_plays_and_one_that_panned_does_not(robot: Robot) -> None
     assert not session.playing
     robot.key("space")
     assert session.playing
+
+
+@pytest.mark.parametrize(
+    ("key", "button", "drag"),
+    [("p", LEFT, "paint"), ("m", LEFT, "select"), ("z", LEFT, "zoom"), ("h", LEFT, "pan"), ("p", MIDDLE, "pan"),
+     ("p", RIGHT, "brush"), ("y", LEFT, "split")],
+)  # fmt: skip
+def test_a_drag_ends_with_the_button_that_it_began_with_and_with_no_other(
+    robot: Robot, key: str, button: int, drag: str
+) -> None:
+    robot.key(key)
+    x, y = robot.at(robot.editor.state.split or PLACE[0], PLACE[1])
+    robot.move(x, y)
+    for other in {LEFT, MIDDLE, RIGHT}:
+        robot.release(other)  # of a press elsewhere
+        assert robot.editor.pointer.drag is None
+    robot.press(button)
+    robot.move(x + 20, y + 20)
+    for other in {LEFT, MIDDLE, RIGHT} - {button}:
+        robot.press(other)
+        robot.release(other)
+        assert robot.editor.pointer.drag == drag
+    robot.release(button)
+    assert robot.editor.pointer.drag is None

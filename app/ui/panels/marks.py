@@ -43,7 +43,7 @@ def draw(
         _forces(ui, view, session, forces, lines)
     if state.split is not None and not state.before:
         _split(ui, view, state.split, lines)
-    if state.symmetry != "none" and not state.before:
+    if not state.before:
         _axes(ui, view, state, lines)
     _path(ui, view, session, lines)
     _waiting(ui, view, session, lines)
