@@ -147,8 +147,9 @@ class Canvas:
             "target_height": float(height),
         }
         corner = {"corner": (float(seen[0]), float(height - seen[3]))}
-        if replay.density is not None:
-            inputs["picture"] = replay.density.values.texture
+        if replay.density is not None and not state.before:
+            defines["MOVED"] = 1
+            inputs["moved"] = replay.density.values.texture
         elif not state.before:
             is_on_it = seen[0] < target.width and seen[3] > height - target.height
             inputs["displacement"], inputs["shown"], picture = self._seen(

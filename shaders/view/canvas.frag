@@ -3,7 +3,8 @@
 // u_picture: premultiplied, sRGB; u_displacement (D): longer sides, linear filtering, over u_shown: left, top, width and
 // height, 0-1 of the picture; u_extent: width and height in longer sides. EDGES: see lib/beyond.glsl. SPLIT: left of u_split
 // the picture is as it was. CHECKER: something may be transparent; u_tile: side of a square of the checkerboard, pixels.
-// SEEN: u_seen, what picture.frag draws, is what is seen of it, its first pixel at u_corner.
+// SEEN: u_seen, what picture.frag draws, is what is seen of it, its first pixel at u_corner. MOVED: u_moved is what is seen of
+// all of it.
 // What is not asked for is left out by defines: a software rasteriser goes through both sides of every branch.
 // GRID: lines of the picture's own coordinates, u_grid of them along the longer side. MASKS: u_masks, what masks.frag draws,
 // its first pixel at u_corner too. ROOM: a tint where u_room, over the picture, swells or shrinks.
@@ -36,6 +37,9 @@ uniform sampler2D u_masks;
 #endif
 #ifdef SEEN
 uniform sampler2D u_seen;
+#endif
+#ifdef MOVED
+uniform sampler2D u_moved;
 #endif
 #if defined(MASKS) || defined(SEEN)
 uniform vec2 u_corner;
@@ -73,12 +77,14 @@ void main() {
     if (warped) place += texture(u_displacement, (x - u_shown.xy) / u_shown.zw).rg / u_extent;
 #ifdef SEEN
     vec4 colour = texture(u_seen, (gl_FragCoord.xy - u_corner) / vec2(textureSize(u_seen, 0)));
-#ifdef SPLIT
-    vec4 unwarped = look_up(x);
-    if (!warped) colour = unwarped;
-#endif
+#elif defined(MOVED)
+    vec4 colour = texture(u_moved, x);
 #else
     vec4 colour = look_up(place);
+#endif
+#if defined(SPLIT) && (defined(SEEN) || defined(MOVED))
+    vec4 unwarped = look_up(x);
+    if (!warped) colour = unwarped;
 #endif
 #ifdef CHECKER
     if (colour.a < 0.999) {

@@ -12,21 +12,23 @@ import moderngl
 import numpy as np
 import pytest
 
-from app.media.pictures import write_picture
+from app.media.pictures import read_picture, write_picture
 from app.media.project import from_picture
 from app.model.forces import PointForce
 from app.model.mask_edits import MaskStroke
 from app.model.picture import Picture, srgb_to_linear
 from app.model.recipe import FluidSettings, Recipe
 from app.model.strokes import Stroke
+from app.progress import Progress
 from app.ui.canvas import EDGES, Canvas, largest_shown, shown_pixels
 from app.ui.editor_state import EditorState
 from app.ui.theme import PALETTES
 from app.ui.viewport import Rect, Viewport
 from app.ui.widgets import Ui
+from app.work.export import run
 from app.work.session import Session
 from solver.gl.device import Device
-from support.editing import Robot, pattern, small_project
+from support.editing import Robot, export_dialog, pattern, small_project
 from support.golden import Golden, told
 
 SIDE = 4
@@ -224,6 +226,38 @@ def test_at_100_percent_a_pixel_of_the_picture_is_one_of_the_screen(robot: Robot
     left, top, (height, width) = round(rect.x), round(rect.y), pixels.shape[:2]
     seen = robot.pixels()[top : top + height, left : left + width]
     assert np.abs(seen.astype(int) - pixels[..., :3]).max() <= 1
+
+
+def test_of_values_that_are_moved_is_seen_what_is_exported_and_before_and_left_of_the_split_what_was_there(
+    device: Device, tmp_path: Path
+) -> None:
+    project = small_project(tmp_path)
+    with Robot(device, replace(project, recipe=project.recipe.edited(mode="density")), sees=True) as robot:
+        editor, before = robot.editor, pattern().pixels.astype(int)
+        robot.drag((0.3, 0.5), (0.7, 0.45))
+        robot.rest()
+        robot.key("ctrl+1")
+        robot.move(700, 20)
+        left, top = round(editor.view.drawn.x), round(editor.view.drawn.y)
+
+        def seen() -> np.ndarray:
+            robot.frame(count=2)
+            return robot.pixels()[top : top + 180, left : left + 240].astype(int)
+
+        job = export_dialog(robot, tmp_path).job()
+        run(device, job, Progress())
+        exported, moved = read_picture(job.target).pixels[..., :3].astype(int), seen()
+        assert np.abs(moved - exported).max() <= 1
+        assert np.abs(moved - before)[60:120, 60:180].mean() > 10
+        robot.hold("\\", True)
+        assert np.abs(seen() - before).max() <= 1
+        robot.hold("\\", False)
+        editor.state.split = 0.5
+        split = seen()
+        left_of, right_of = np.s_[40:, :104], np.s_[40:, 136:]  # below what it is called, and beside its handle
+        assert np.abs(split - before)[left_of].max() <= 1
+        assert np.abs(split - exported)[right_of].max() <= 1
+        assert all(np.abs(exported - before)[side].max() > 50 for side in (left_of, right_of))
 
 
 def test_whatever_was_drawn_before_is_not_seen(device: Device, tmp_path: Path) -> None:
