@@ -66,6 +66,35 @@ def test_a_mask_of_what_moves_is_asked_for_first_and_then_one_of_where_it_goes_b
     assert fitted == [((), (there / "one.png", there / "other.png"))]
 
 
+@pytest.mark.parametrize("name", ["open", "open_frames", "apply_to", "import_map", "mask_load"])
+def test_what_is_chosen_is_taken_for_what_it_was_asked_for(
+    robot: Robot, widgets: Widgets, tmp_path: Path, name: str
+) -> None:
+    editor, there = robot.editor, tmp_path / "there"
+    there.mkdir()
+    for number in (1, 2, 3):
+        write_picture(there / f"frame{number}.png", pattern(60, 40))
+    write_foreign_map(there / "m.exr", 240, 180)
+    robot.drag((0.3, 0.5), (0.4, 0.5), steps=2)
+    robot.rest()
+    editor.do(name)
+    asked = editor.dialogs.shown[-1]
+    assert isinstance(asked, Browser)
+    asked.typed = str(there / ("m.exr" if name == "import_map" else "frame2.png"))
+    widgets.click(asked.title.split()[0])
+    assert asked not in editor.dialogs.shown
+    if editor.dialogs.shown:
+        widgets.click("Don't save")
+    robot.until(lambda: not editor.files.is_loading)
+    session, recipe = editor.session, editor.session.recipe
+    assert session.project.picture.width == (60 if name in ("open", "open_frames", "apply_to") else 240)
+    assert (session.project.clip is not None) == (name == "open_frames")
+    assert bool(recipe.stroke) == (name in ("apply_to", "mask_load", "import_map"))
+    assert (recipe.map is not None) == (name == "import_map")
+    assert bool(recipe.mask) == (name == "mask_load")
+    assert editor.state.overlays["frozen"].shown == (name == "mask_load")
+
+
 @pytest.mark.parametrize("is_typed", [False, True])
 def test_whether_to_replace_is_asked_of_the_file_that_would_be(
     robot: Robot, widgets: Widgets, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, is_typed: bool

@@ -21,6 +21,7 @@ from app.media.pictures import read_picture, write_picture
 from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.ui import clipboard
+from app.ui.actions import ACTIONS
 from app.ui.preferences import Preferences
 from app.ui.saving import SaveDialog
 from app.work.jobs import Job
@@ -28,7 +29,7 @@ from app.work.replay import Replay
 from solver.gl.device import Device
 from support.commands import Run
 from support.desk import Desk, needs_a_screen
-from support.editing import Robot, export_dialog, pattern, small_project
+from support.editing import Robot, Still, export_dialog, pattern, small_project
 
 FILLING = """
 import copykitten, numpy as np
@@ -243,3 +244,18 @@ def test_a_pasted_picture_goes_into_its_project(robot: Robot, tmp_path: Path) ->
     pasted, other = dialog(clipboard.pasted_folder()), dialog(tmp_path)
     assert (pasted.must_embed, pasted.embed) == (True, True)
     assert (other.must_embed, other.embed) == (False, False)
+
+
+def test_while_a_file_is_exported_no_picture_is_copied(
+    device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("copykitten")
+    monkeypatch.setattr("app.ui.export_dialog.ExportProcess", Still)
+    with Robot(device, small_project(tmp_path)) as robot:
+        exports = robot.editor.exports
+        exports.start(export_dialog(robot, tmp_path).job())
+        name = exports.name
+        robot.key(ACTIONS["copy_picture"].keys[0])
+        assert "An export is still running" in robot.editor.messages.shown[-1].text
+        assert (exports.is_running, exports.name) == (True, name)
+        exports.cancel()

@@ -42,7 +42,7 @@ from app.ui.files import fresh_recipe, load_any
 from app.ui.key_sheet import KeySheet
 from app.ui.numbers import Numbers
 from app.ui.preferences import Preferences
-from app.ui.quality import GRIDS, PATIENCE, TICKS, TRIALS, Speed
+from app.ui.quality import GRIDS, LONGEST, PATIENCE, TICKS, TRIALS, Speed
 from app.ui.saving import SaveDialog
 from app.ui.widgets import Ui
 from app.work.export import run
@@ -1856,6 +1856,38 @@ def test_the_grid_of_a_project_stays(device: Device, tmp_path: Path) -> None:
         paint_at(robot, 0.1, ENOUGH)
         robot.frame(count=20)
         assert robot.editor.session.recipe.fluid.grid == 128
+
+
+@pytest.mark.parametrize(("each", "is_prepared"), [(0.8, True), (1.1, False)])
+def test_a_grid_is_not_prepared_that_would_take_the_machine_longer_than_two_minutes(
+    measured: Robot, each: float, is_prepared: bool
+) -> None:
+    """A machine at rest should rest. `each`: what all ticks take, of two minutes."""
+    session, quality = measured.editor.session, measured.editor.quality
+    session.begin_with(grid=128)
+    measured.move(*measured.at(0.4, 0.5))
+    measured.press()
+    for step in range(round(ENOUGH / 0.1) + 1):
+        measured.frame(Move(*measured.at(0.4 + 0.005 * step, 0.5)), dt=0.1)
+        quality.speed = Speed(fixed=each * 1e3 * LONGEST / session.tick, growing=0.0, drawing=5.0)
+    assert session.tick > 12
+    measured.release()
+    session.settle()
+    assert quality.is_preparing == is_prepared
+
+
+def test_a_press_interrupts_what_is_measured_which_begins_anew_then(automatic: Robot) -> None:
+    quality, asked = automatic.editor.quality, list[bool]()
+
+    def pressed() -> bool:
+        asked.append(len(asked) in (3, 40, 41, 90))
+        return asked[-1]
+
+    automatic.editor.rehearsal.has_news = pressed
+    automatic.until(lambda: not quality.is_measuring)
+    assert sum(asked) == 4
+    assert quality.speed is not None
+    assert automatic.device.watch is None
 
 
 def test_for_a_project_the_machine_is_not_measured(automatic: Robot, tmp_path: Path) -> None:

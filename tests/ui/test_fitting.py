@@ -29,7 +29,7 @@ from app.work.fitting import Fit
 from app.work.worker import Outcome
 from solver.gl.device import Device
 from support.commands import Run
-from support.editing import Robot, small_project
+from support.editing import Robot, Still, small_project
 from support.widgets import Widgets
 
 PATIENCE = 300.0  # seconds, of a machine that does much else
@@ -110,6 +110,19 @@ def test_a_fit_is_one_edit_that_is_played_and_the_command_line_s(robot: Robot, f
         assert [(handle.at, handle.to) for handle in fitted.handle] == [(one.at, one.to) for one in made.handle]
         if not of_pairs:  # where a search begins at the handles' own sizes, too
             assert fitted.text() == made.edited(picture=None).text()
+
+
+def test_a_fit_that_is_stopped_before_it_has_found_anything_leaves_all_as_it_was(
+    robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = names(robot), robot.editor.session.recipe
+    stopped = type("Stopped", (Still,), {"is_done": True, "error": "", "outcome": Outcome("pattern")})
+    monkeypatch.setattr("app.ui.fitting.FitProcess", stopped)
+    robot.editor.fits.start()
+    robot.until(lambda: not robot.editor.fits.is_running)
+    said = "The fit was stopped before it had found anything. Nothing has changed."
+    assert [message.text for message in robot.editor.messages.shown] == [said]
+    assert (names(robot), robot.editor.session.recipe) == before
 
 
 def test_what_is_fitted_is_the_work_that_is_open_as_the_command_line_would(robot: Robot) -> None:
