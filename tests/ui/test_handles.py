@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -649,6 +649,41 @@ def test_a_handle_that_holds_back_a_stroke_is_told_of_once(robot: Robot) -> None
     robot.key("ctrl+z")
     robot.rest()
     assert told() == []
+
+
+def hold_back(robot: Robot) -> None:
+    robot.editor.session.edit("Handle", handle=(RecipeHandle(at=(0.5, 0.5), to=(0.5, 0.5)),))
+    robot.rest()
+    robot.key("p")
+    robot.drag((0.4, 0.5), (0.55, 0.5))
+
+
+def contradict(robot: Robot) -> None:
+    led = tuple(RecipeHandle(at=(0.5, 0.5), to=(x, 0.5), duration=0.1) for x in (0.45, 0.55))
+    robot.editor.session.edit("Handles", handle=led, duration=0.2)
+
+
+def fold(robot: Robot) -> None:
+    y, x = np.mgrid[0:180, 0:240] / 240
+    bump = -1.5 * (x - 0.5) * np.exp(-((x - 0.5) ** 2 + (y - 0.4) ** 2) / 0.1**2)
+    robot.editor.session.replay.warp.set(np.stack([bump, 0 * y], axis=-1).astype(np.float32))
+
+
+@pytest.mark.parametrize(
+    ("make", "words"), [(hold_back, "holds its place"), (contradict, "andle 2"), (fold, "folds over itself")]
+)
+def test_what_is_told_of_one_work_is_told_of_the_next_one_too(
+    robot: Robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, make: Callable[[Robot], None], words: str
+) -> None:
+    monkeypatch.setattr("app.ui.canvas.PARTS", 1)
+    for number in (1, 2):
+        (tmp_path / str(number)).mkdir()
+        robot.editor.open(small_project(tmp_path / str(number), grid=64))
+        robot.rest()
+        assert not robot.editor.messages.shown
+        make(robot)
+        robot.rest()
+        assert any(words in message.text for message in robot.editor.messages.shown), number
 
 
 def test_a_handle_is_solved_as_finely_as_its_size_asks_for(robot: Robot) -> None:
