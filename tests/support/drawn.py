@@ -17,6 +17,15 @@ SHAPES = (
     "add_circle", "add_circle_filled", "add_convex_poly_filled", "add_image", "add_line", "add_polyline", "add_rect",
     "add_rect_filled", "add_text", "add_triangle_filled", "push_clip_rect", "pop_clip_rect",
 )  # fmt: skip
+UNSEEN = (
+    "percent",
+    "edge",
+    "ruler",
+    "bars",
+    "entry",
+    "preset",
+    "track",
+)  # that can be pressed beside what is drawn there
 NEAR = 0.6  # points, and of the numbers for the canvas's shader, parts of a hundred
 
 
@@ -26,14 +35,17 @@ class Drawn:
     Args:
         monkeypatch: of the test, at whose end nothing is noted any more.
         shapes: those that are noted; each that is costs time.
+        pressed: also where those of `UNSEEN` can be pressed.
     """
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch, shapes: Sequence[str] = SHAPES) -> None:
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, shapes: Sequence[str] = SHAPES, pressed: bool = False) -> None:
         self.lines: list[str] = []
         for name in shapes:
             self._note_shape(monkeypatch, name)
         for name in ("menu_item", "combo", "begin_menu", "text_unformatted", "input_text"):
             self._note_words(monkeypatch, name)
+        if pressed:
+            self._note_pressed(monkeypatch)
         tooltip, call, draw_into = Ui.tooltip, Pass.__call__, Pass.draw_into
 
         def told(ui: Ui, title: str, key: str = "", more: str = "", at_once: bool = False, above: bool = False) -> None:
@@ -80,6 +92,16 @@ class Drawn:
             return drawn(*given)
 
         monkeypatch.setattr(imgui, name, noting)
+
+    def _note_pressed(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        drawn = imgui.invisible_button
+
+        def noting(name: str, size: imgui.ImVec2, *flags: Any) -> bool:
+            if name.startswith(UNSEEN):
+                self.lines.append(f"pressed {_told(imgui.get_cursor_screen_pos())} {_told(size)} | {name}")
+            return drawn(name, size, *flags)
+
+        monkeypatch.setattr(imgui, "invisible_button", noting)
 
     def take(self) -> list[str]:
         """What has been noted since the last time."""

@@ -301,7 +301,7 @@ def test_draws_what_is_written_down(device: Device, tmp_path: Path, tour: object
     def drawn_in_a_frame() -> list[str]:
         """Of one in several: what is noted takes its time."""
         with pytest.MonkeyPatch.context() as noting:
-            drawn = Drawn(noting)
+            drawn = Drawn(noting, pressed=True)
             robot.frame()
         return drawn.take()
 
