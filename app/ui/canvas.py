@@ -147,7 +147,7 @@ class Canvas:
             "target_height": float(height),
         }
         corner = {"corner": (float(seen[0]), float(height - seen[3]))}
-        if replay.density is not None and not state.before:
+        if replay.density is not None:
             defines["MOVED"] = 1
             inputs["moved"] = replay.density.values.texture
         elif not state.before:

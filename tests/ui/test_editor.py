@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from threading import Event
+from typing import Any
 from weakref import WeakSet
 
 import moderngl
@@ -25,9 +26,11 @@ from app.media.maps import read_map, write_map
 from app.media.pictures import read_picture, write_picture
 from app.media.project import Project
 from app.model.forces import VortexForce
-from app.model.mask_edits import MaskStroke
+from app.model.handles import RecipeHandle, RecipePin
+from app.model.mask_edits import MaskStroke, mask_edit
 from app.model.picture import Picture
 from app.model.recipe import FluidSettings, Recipe, Stop
+from app.model.strokes import Change, Stroke
 from app.model.tools import TOOLS
 from app.progress import Progress
 from app.ui import workspace
@@ -47,6 +50,7 @@ from app.ui.saving import SaveDialog
 from app.ui.widgets import Ui
 from app.work.export import run
 from app.work.jobs import Job, MapOutput, Outputs
+from app.work.replay import Replay
 from solver.brush.masks import ZERO
 from solver.gl.device import Device
 from solver.gl.field import GraphicsMemoryError, new_texture
@@ -1681,6 +1685,33 @@ def test_what_is_measured_has_none_of_the_forces_of_the_work(automatic: Robot) -
     assert quality.speed is not None
     assert not [message for message in automatic.editor.messages.shown if "throws the fluid" in message.text]
     assert session.recipe.force == (force,)
+
+
+def test_what_is_measured_has_nothing_of_the_work_but_its_fluid(
+    automatic: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session, quality, measured = automatic.editor.session, automatic.editor.quality, list[Recipe]()
+
+    def noting(device: Device, recipe: Recipe, *given: Any, **named: Any) -> Replay:
+        measured.append(recipe)
+        return Replay(device, recipe, *given, **named)
+
+    monkeypatch.setattr("app.ui.quality.Replay", noting)
+    session.edit(
+        "All there is",
+        stroke=(Stroke(tool="twirl", samples=((0, 0.3, 0.5, 1.0), (3, 0.4, 0.5, 1.0))),),
+        change=(Change(tick=2, drag=1.0),),
+        mask=(mask_edit({"kind": "fill", "tick": 0, "of": "frozen", "amount": 0.5}),),
+        force=(VortexForce(kind="vortex", point=(0.5, 0.5), strength=0.1),),
+        handle=(RecipeHandle(at=(0.2, 0.2), to=(0.3, 0.2)),),
+        pin=(RecipePin(at=(0.7, 0.5)),),
+    )
+    session.settle()
+    automatic.until(lambda: not quality.is_measuring)
+    assert [recipe.fluid.grid for recipe in measured] == list(TRIALS)
+    for recipe in measured:
+        assert [stroke.tool for stroke in recipe.stroke] == ["push"]
+        assert (*recipe.change, *recipe.mask, *recipe.force, *recipe.handle, *recipe.pin) == ()
 
 
 def test_the_machine_is_measured_only_once_nothing_plays_any_more(automatic: Robot) -> None:
