@@ -39,6 +39,7 @@ from solver.gl.device import Device
 from support.drawn import Drawn
 from support.editing import Robot, Still, add_bars, pattern, small_project
 from support.laid import Laid
+from support.widgets import Widgets
 
 SIZES = (SMALLEST, (1280, 800), (3840, 2160))
 # Where room is short at every size of the interface, and where there is more at one or two: pairs, not all nine.
@@ -265,6 +266,22 @@ def test_what_floats_lies_on_the_canvas_however_narrow_that_is(
                 widths.add(canvas.width)
     assert len(widths) > 20
     assert not told
+
+
+def test_answers_stand_in_one_row_wherever_that_leaves_eight_points_between_them(
+    device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    likes, rows, do = Preferences(auto_quality=False), list[bool](), lambda *_: None
+    with Robot(device, small_project(tmp_path), (460, 400), preferences=likes) as robot:
+        widgets = Widgets(robot, monkeypatch)
+        robot.editor.dialogs.show(PictureOrMap("a.exr", do, do))
+        for width in range(460, 436, -1):
+            robot.size = width, 400
+            robot.frame(count=2)
+            first, second = widgets.at["Cancel"], widgets.at["Use as map"]
+            rows.append(abs(first.y - second.y) < 1)
+            assert rows[-1] == (second.x - first.right >= 8), width
+    assert set(rows) == {True, False}
 
 
 def test_the_bar_has_room_for_export_however_narrow_it_is(
