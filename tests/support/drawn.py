@@ -35,7 +35,7 @@ class Drawn:
     Args:
         monkeypatch: of the test, at whose end nothing is noted any more.
         shapes: those that are noted; each that is costs time.
-        pressed: also where those of `UNSEEN` can be pressed.
+        pressed: also where those of `UNSEEN` can be pressed, and lists and fields.
     """
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, shapes: Sequence[str] = SHAPES, pressed: bool = False) -> None:
@@ -102,6 +102,20 @@ class Drawn:
             return drawn(name, size, *flags)
 
         monkeypatch.setattr(imgui, "invisible_button", noting)
+        for name in ("combo", "input_text", "input_text_with_hint"):
+            self._note_field(monkeypatch, name)
+
+    def _note_field(self, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+        drawn = getattr(imgui, name)
+
+        def noting(label: str, *given: Any) -> Any:
+            said = drawn(label, *given)
+            self.lines.append(
+                f"pressed {_told(imgui.get_item_rect_min())} {_told(imgui.get_item_rect_size())} | {label}"
+            )
+            return said
+
+        monkeypatch.setattr(imgui, name, noting)
 
     def take(self) -> list[str]:
         """What has been noted since the last time."""
