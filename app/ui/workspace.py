@@ -139,12 +139,7 @@ class Workspace:
 
         `pixels`: the picture as the canvas shows it, if it is at hand. `found`: what the project was restored from.
         """
-        canvas = Canvas(self._device, project, pixels)
-        try:
-            session = Session(self._device, project)
-        except Exception:
-            canvas.release()
-            raise
+        canvas, session = Canvas(self._device, project, pixels), Session(self._device, project)
         if found is not None:
             session.document.restore(found.work.history, found.work.saved)
         self._journals.open(session, found)

@@ -59,6 +59,7 @@ from solver.resample.sampler import Sampler
 from support.commands import Run
 from support.drawn import Drawn
 from support.editing import BY_KEY, Robot, export_dialog, pattern, small_project, write_foreign_map
+from support.gl_objects import living
 from support.widgets import Widgets
 
 
@@ -1005,6 +1006,19 @@ def test_whatever_fails_while_a_file_is_read_is_told_and_the_work_stays(
     robot.until(lambda: not robot.editor.files.is_loading)
     assert [message.text for message in robot.editor.messages.shown] == [said.format(tmp_path / "a.png")]
     assert robot.editor.session is session
+
+
+def test_work_that_cannot_be_begun_is_told_of_and_leaves_nothing_on_the_gpu(robot: Robot, tmp_path: Path) -> None:
+    """As its map is none, which shows only where it is begun with."""
+    np.save(tmp_path / "m.npy", np.zeros((3, 4, 5), np.float32))
+    (tmp_path / "r.toml").write_text('picture = "pattern.png"\nmap = "m.npy"\n')
+    session, before = robot.editor.session, living(robot.device, "Texture")
+    for _ in range(2):
+        robot.drop(tmp_path / "r.toml")
+        assert robot.editor.session is session
+        (said,) = [message.text for message in robot.editor.messages.shown]
+        assert "m.npy" in said
+    assert living(robot.device, "Texture") == before
 
 
 def test_a_folder_that_is_not_there_is_told_in_the_browser(robot: Robot) -> None:
