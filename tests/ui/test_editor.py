@@ -136,6 +136,24 @@ def test_one_fold_of_the_warp_is_told_when_it_comes_up(robot: Robot, monkeypatch
     assert [message.text for message in messages.shown] == ["The warp folds over itself in 1 of 6912 places. Undo."]
 
 
+@pytest.mark.parametrize("times", [1, 2])
+def test_a_fold_of_work_that_is_opened_is_told_each_time(
+    robot: Robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, times: int
+) -> None:
+    """As that of a map to start from: it is there in the first frame."""
+    monkeypatch.setattr("app.ui.canvas.PARTS", 1)
+    y, x = np.mgrid[0:180, 0:240] / 240
+    bump = -1.5 * (x - 0.5) * np.exp(-((x - 0.5) ** 2 + (y - 0.4) ** 2) / 0.1**2)
+    np.save(tmp_path / "m.npy", np.stack([bump, 0 * y], axis=-1).astype(np.float32) * 240)
+    (tmp_path / "r.toml").write_text('picture = "pattern.png"\nmap = "m.npy"\n')
+    for _ in range(times):
+        robot.editor.messages.shown.clear()
+        robot.drop(tmp_path / "r.toml")
+        robot.frame(count=2)
+    said = [message.text for message in robot.editor.messages.shown]
+    assert any(text.startswith("The warp folds over itself") for text in said), said
+
+
 def test_a_fold_of_a_part_of_the_warp_alone_is_told_with_what_helps(
     robot: Robot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
