@@ -1,4 +1,4 @@
-"""The timeline's buttons: what each is called and shows, by what is going on."""
+"""The timeline's buttons, Undo and Redo: what each is called and shows, by what is going on."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from typing import Any
 import pytest
 
 from app.media.animation import animation_writer
+from app.media.pictures import write_picture
+from app.media.project import from_picture
 from app.ui.widgets import Ui
 from support.editing import Robot, pattern
 
@@ -89,3 +91,32 @@ def test_what_a_click_makes_of_how_it_is_played_is_what_is_told(
         assert now == [coming]
     begun = modes.index(seen[0])
     assert seen == [*modes, *modes, *modes, *modes][begun : begun + 6]
+
+
+def test_undo_and_redo_can_be_pressed_wherever_there_is_something_to_undo_or_redo(
+    robot: Robot, buttons: Buttons, tmp_path: Path
+) -> None:
+    """Also a stroke that is being painted, and that another picture was opened."""
+
+    def can() -> tuple[bool, bool]:
+        return buttons["undo"][2], buttons["redo"][2]
+
+    write_picture(tmp_path / "other.png", pattern(60, 40))
+    assert can() == (False, False)
+    robot.move(*robot.at(0.4, 0.4))
+    robot.press()
+    robot.move(*robot.at(0.5, 0.4))
+    assert can() == (True, False)
+    robot.release()
+    robot.rest()
+    assert can() == (True, False)
+    robot.editor.open(from_picture(tmp_path / "other.png", robot.editor.session.recipe.edited(stroke=())))
+    assert can() == (True, False)
+    for chord, wanted in (
+        ("ctrl+z", (True, True)), ("ctrl+z", (False, True)), ("ctrl+shift+z", (True, True)),
+        ("ctrl+shift+z", (True, False)),
+    ):  # fmt: skip
+        robot.key(chord)
+        robot.rest()
+        assert can() == wanted
+    assert robot.editor.canvas.size == (60, 40)
