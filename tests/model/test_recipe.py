@@ -14,7 +14,8 @@ from pydantic import ValidationError
 from app.errors import UserError
 from app.media.opening import shipped_recipes
 from app.media.recipes import read_recipe
-from app.model import toml
+from app.model import areas, forces, masks, strokes, toml
+from app.model import recipe as recipes
 from app.model.edits import cut_off, with_change, with_taken
 from app.model.recipe import DensitySettings, FluidSettings, Output, Playback, Recipe
 from app.model.schema import written
@@ -282,6 +283,43 @@ def test_what_must_not_go_beyond_another_may_be_the_same(text: str):
     Recipe.parse(text)
 
 
+CURVES = 2 * "[[force]]\nkind = 'curve'\npoints = [[0.1, 0.1], [0.6, 0.1], [0.6, 0.9]]\nradius = 0.02\n"
+PIECES = 3 + 8 * 1.3 / 0.02  # of one of them
+LINES = (
+    2 * "[[handle]]\npoints = [[0.1, 0.1], [0.2, 0.1]]\nkeys = []\n" + "[[pin]]\npoints = [[0.1, 0.5], [0.2, 0.5]]\n"
+)
+OUTLINE = "outline = [[0, 0], [1, 0], [1, 1], [0.5, 0.7], [0, 1]]\n"
+
+
+@pytest.mark.parametrize(
+    ("module", "limit", "text", "count", "words"),
+    [
+        (areas, "MOST_CORNERS", f"[[mask]]\nkind = 'fill'\nof = 'frozen'\ntick = 0\namount = 1\n{OUTLINE}", 5,
+         "its outline has 5 corners; at most 4 work"),
+        (masks, "MOST_POINTS", "[[freeze]]\nkind = 'path'\npoints = [[0, 0], [1, 0], [1, 1]]", 3,
+         "its path has 3 points; at most 2 work"),
+        (forces, "MOST_FORCES", CURVES, 2, "there are 2 forces; at most 1 work"),
+        (forces, "MOST_PIECES", CURVES, PIECES, "'radius' (0.02) is too small for so long a curve"),
+        (forces, "MOST_PIECES_IN_ALL", CURVES, 2 * PIECES, "the curves of the forces are cut into 1046 pieces"),
+        (forces, "MOST_COVERED", CURVES, 2 * PIECES * 0.04**2, "cover the whole picture 2 times; at most"),
+        (strokes, "MOST_AT_ONCE", 3 * (STROKE + "\n"), 3, "3 strokes act at once in tick 0"),
+        (recipes, "MOST_TICKS", "duration = 10\nfluid = { dt = 0.01 }", 1000,
+         "'duration' / 'fluid.dt' is more than 999 ticks"),
+        (recipes, "MOST_HANDLES", LINES, 3, "there are 3 handles and pins; at most 2 work"),
+        (recipes, "MOST_LINES", LINES, 3, "there are 3 lines that are led or held; at most 2 work"),
+    ],
+)  # fmt: skip
+def test_of_what_is_counted_there_may_be_as_much_as_the_limit(
+    module: Any, limit: str, text: str, count: float, words: str, monkeypatch: pytest.MonkeyPatch
+):
+    """And no more: it is refused in a sentence when it is read."""
+    monkeypatch.setattr(module, limit, count)
+    Recipe.parse(text)
+    monkeypatch.setattr(module, limit, count - 1 if isinstance(count, int) else 0.999 * count)
+    with pytest.raises(UserError, match=re.escape(words)):
+        Recipe.parse(text)
+
+
 @pytest.mark.parametrize(
     ("table", "kinds"),
     [
@@ -485,6 +523,13 @@ def test_of_a_change_at_the_tick_where_one_goes_on_the_settings_stay_and_what_it
     assert cut_off(whole, 4).fluid_at(4) == whole.fluid_at(4)
     assert cut_off(whole, 3).change == ()
     assert cut_off(Recipe(duration=9.0, change=(done_only,)), 4).change == ()
+
+
+@pytest.mark.parametrize(("tick", "ticks"), [(0, 1), (1, 1), (2, 2), (7, 7)])
+def test_what_is_cut_off_lasts_up_to_there_or_one_tick(tick: int, ticks: int):
+    cut = cut_off(Recipe(stroke=(push((0, 0, 0, 1), (9, 1, 0, 1)),), duration=1.0), tick)
+    assert (cut.duration, cut.ticks) == (ticks * cut.fluid.dt, ticks)
+    assert [stroke.last_tick for stroke in cut.stroke] == ([ticks - 1] if tick else [])
 
 
 def test_what_a_reset_lets_go_of_is_held_again_where_the_reset_is_cut_off():
