@@ -271,6 +271,34 @@ def test_a_recipe_s_frozen_parts_can_be_thawed_and_come_back(device: Device, mas
     np.testing.assert_array_equal(masks.frozen.get() >= 128, frozen)
 
 
+@pytest.mark.parametrize("by_recipe", [False, True])
+@pytest.mark.parametrize("name", ["frozen", "thickness"])
+def test_paint_is_taken_off_one_mask_and_the_other_keeps_its(
+    device: Device, masks: Masks, name: str, by_recipe: bool
+) -> None:
+    """Where there was some, where there is none any more, and where there never was any."""
+    frozen = np.zeros((CANVAS.ny, CANVAS.nx), bool)
+    frozen[:, :200] = by_recipe
+    masks.set_frozen(frozen)
+    masks.take_off(name)
+    before = told(masks, device, GRID)
+    paint = {"frozen": lambda: masks.freeze(Tip((0.8, 0.3), (0.8, 0.3), 0.1), 1),
+             "thickness": lambda: masks.thicken(Tip((0.6, 0.3), (0.6, 0.3), 0.1), 2)}  # fmt: skip
+    paint[name]()
+    assert any((one != other).any() for one, other in zip(told(masks, device, GRID), before, strict=True))
+    for _ in range(2):
+        masks.take_off(name)
+        np.testing.assert_array_equal(told(masks, device, GRID), before)
+    for one in paint.values():
+        one()
+    both = told(masks, device, GRID)
+    masks.take_off(name)
+    left = 0 if name == "frozen" else 1  # of viscosity and what is solid
+    now = told(masks, device, GRID)
+    np.testing.assert_array_equal(now[left], both[left])
+    np.testing.assert_array_equal(now[1 - left], before[1 - left])
+
+
 def test_smoothing_takes_a_mask_to_the_means_around(masks: Masks) -> None:
     tip = Tip((0.5, 0.3), (0.5, 0.3), 0.2)
     masks.thicken(Tip((0.5, 0.3), (0.5, 0.3), 0.1, 1.0), 2)

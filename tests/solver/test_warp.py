@@ -448,6 +448,36 @@ def test_a_large_map_is_measured_at_as_many_of_its_texels_as_may_be(
     warp.release()
 
 
+@pytest.mark.parametrize(
+    ("picture", "result", "wanted"),
+    [
+        ((96, 48), (96, 48), (96, 48)),  # as large as the map's own
+        ((500, 250), (48, 24), (48, 24)),  # of a small result no more than it has
+        ((48, 24), (500, 250), (48, 24)),  # nor of a small picture
+        ((32, 16), (500, 250), (32, 16)),
+        ((6, 3), (500, 250), (32, 16)),  # but two a cell
+        ((6, 3), (16, 8), (16, 8)),  # unless the result has fewer
+        ((49, 3), (500, 250), (96, 48)),  # a whole number of the map's for one
+        ((3, 25), (500, 250), (96, 48)),  # the same along both sides
+        ((3, 3), (500, 5), (32, 16)),
+        ((500, 250), (20, 24), (48, 24)),
+    ],
+)
+def test_a_map_is_composed_no_finer_than_a_result_needs(
+    device: Device, picture: tuple[int, int], result: tuple[int, int], wanted: tuple[int, int]
+) -> None:
+    """Of 16 x 8 cells, and in a picture that lies on its side; of what is held, all of its texels."""
+    lying: list[Any] = [(16, 8), (1.0, 0.5), (96, 48), picture, result, wanted]
+    for cells, extent, size, given, asked, composed in (lying, [side[::-1] for side in lying]):
+        warp = WarpMap(device, Grid(*cells, extent), size)
+        assert warp.size_for(given, asked) == composed
+        frozen = device.upload(np.full(size[::-1], 255, np.uint8))
+        warp.hold(frozen)
+        assert warp.size_for(given, asked) == size
+        frozen.release()
+        warp.release()
+
+
 def test_a_fold_between_the_places_that_a_large_map_is_measured_at_is_found_at_all_of_its_texels(
     device: Device, monkeypatch: pytest.MonkeyPatch
 ) -> None:
