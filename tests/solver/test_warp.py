@@ -468,8 +468,9 @@ def test_a_map_is_composed_no_finer_than_a_result_needs(
 ) -> None:
     """Of 16 x 8 cells, and in a picture that lies on its side; of what is held, all of its texels."""
     lying: list[Any] = [(16, 8), (1.0, 0.5), (96, 48), picture, result, wanted]
-    for cells, extent, size, given, asked, composed in (lying, [side[::-1] for side in lying]):
-        warp = WarpMap(device, Grid(*cells, extent), size)
+    for turn in (1, -1):
+        cells, extent, size, given, asked, composed = (side[::turn] for side in lying)
+        warp = WarpMap(device, Grid(cells[0], cells[1], extent), size)
         assert warp.size_for(given, asked) == composed
         frozen = device.upload(np.full(size[::-1], 255, np.uint8))
         warp.hold(frozen)
