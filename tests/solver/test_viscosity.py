@@ -8,11 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.fft
+import scipy.special
 from scipy import ndimage
 
 from solver import Fluid, Grid, WarpMap
 from solver.gl.device import Device
 from solver.params import Walls
+from solver.viscosity import plan as plans
+from solver.viscosity.plan import Plan
 from solver.viscosity.solve import Viscosity
 from support import reference
 
@@ -443,3 +446,91 @@ def test_what_is_solid_does_not_say_how_the_rest_is_solved(device: Device) -> No
         plans.append(step.solver.plan)
     assert plans[1:] == plans[:1] * 2
     assert plans[0].method == "cg"
+
+
+@pytest.mark.parametrize("kappa", [1e-6, 0.01, 0.1, 0.4, 3.0, 1e4])
+@pytest.mark.parametrize("leaves", [0.5, 0.01, 1e-5])
+def test_no_more_sweeps_are_made_than_leave_so_little(kappa: float, leaves: float) -> None:
+    """Of n of them the error is 1 / T_n(1 + 1 / (8 kappa)), by Chebyshev's polynomials."""
+    count = plans.sweeps_alone(kappa, leaves)
+    left = [1 / scipy.special.eval_chebyt(n, 1 + 1 / (8 * kappa)) for n in (count - 1, count)]
+    assert left[1] <= leaves < left[0]
+
+
+def test_where_nothing_is_to_be_left_out_one_sweep_is_made() -> None:
+    assert plans.sweeps_alone(0.0, 1e-6) == plans.sweeps_alone(5.0, 1.0) == plans.sweeps_alone(5.0, 2.0) == 1
+
+
+BEYOND = 1 + 1e-9
+
+
+@pytest.mark.parametrize(
+    ("least", "largest", "wanted"),
+    [
+        (1.0, 300.0, Plan("cg", 2, 0.012, stiff=30)),
+        (1.0, 300 * BEYOND, Plan("cg", 1, 0.07, stiff=30)),
+        (4.0, 1200.0, Plan("cg", 2, 0.012, stiff=30)),
+        (4.0, 1200 * BEYOND, Plan("cg", 1, 0.07, stiff=30)),
+        (4 * BEYOND, 1300.0, Plan("cg", 2, 0.07, stiff=30)),
+        # What is stiff: 30, or four times the softest.
+        (1.0, 30.0, Plan("cg", 2, 0.012)),
+        (1.0, 30 * BEYOND, Plan("cg", 2, 0.012, stiff=30)),
+        (7.5, 30 * BEYOND, Plan("cg", 2, 0.012, stiff=30)),
+        (10.0, 40.0, Plan("cg", 2, 0.012)),
+        (10.0, 40 * BEYOND, Plan("cg", 2, 0.012, stiff=40)),
+    ],
+)
+def test_how_a_viscous_step_is_solved_by_its_contrast(least: float, largest: float, wanted: Plan) -> None:
+    """Of many cells; of few, to a ninth of the tolerance, but where the contrast is large."""
+    for cells, share in ((64 * 64 + 1, 1.0), (64 * 64, 1 / 9)):
+        tolerance = wanted.tolerance * (share if wanted.tolerance < 0.07 else 1)
+        found = plans.plan_for(least, largest, cells, False, False)
+        assert found == dataclasses.replace(wanted, stiff=pytest.approx(wanted.stiff), tolerance=tolerance)
+
+
+@pytest.mark.parametrize(
+    ("least", "largest", "wanted"),
+    [
+        (1.0, 300.0, (2, 30, False)),  # with edges, but neither soft nor of a large contrast
+        (1.0, 300 * BEYOND, (2, 40, True)),
+        (4.0, 1200.0, (2, 30, False)),
+        (5.0, 200.0, (2, 30, False)),  # 40 times the softest
+        (5.0, 200 * BEYOND, (2, 200, True)),
+        (0.5, 151.0, (2, 30, True)),  # least of all is 30
+    ],
+)
+def test_parts_with_edges_are_moved_as_a_whole(least: float, largest: float, wanted: tuple[int, float, bool]) -> None:
+    plan = plans.plan_for(least, largest, 10_000, False, True)
+    assert (plan.sweeps, pytest.approx(plan.stiff), plan.rigid) == wanted
+
+
+@pytest.mark.parametrize("cells", [64 * 64, 64 * 64 + 1])
+def test_little_viscosity_is_smoothed_alone_and_one_has_a_cycle_that_is_known(cells: int) -> None:
+    """Up to ten sweeps, which leave 0.008 of the energy, or on few cells a ninth of it."""
+    share = 1.0 if cells > 64 * 64 else 1 / 9
+    for kappa in np.linspace(0.005, 1, 200):
+        count = plans.sweeps_alone(kappa, share * 0.008 / (16 * kappa))
+        for is_one in (False, True):
+            found = plans.plan_for(0.0, kappa, cells, is_one, False)
+            assert (found.method, found.sweeps) == ("smooth", count) if count <= 10 else (found.method == "cg")
+            if is_one and count > 10:
+                assert found == Plan("cg", 2, share * 0.008, cycle_leaves=0.52)
+
+
+def test_what_is_sharp_has_solids_or_edges_along_a_quarter_of_its_border() -> None:
+    """A border is where the softest, up to 40 times of it, meets what is stiffer; an edge, by 300 times stiffer."""
+    soft, none = np.full((8, 12), 5.0), np.zeros((8, 12), bool)
+    assert not plans.is_sharp(soft, none)
+    solid = none.copy()
+    solid[3, 4] = True
+    assert plans.is_sharp(soft, solid)
+    for turn in (lambda one: one, np.transpose):
+        for edges, wanted in ((2, False), (3, True)):
+            kappa = soft.copy()
+            kappa[:, 5:] = 5 * 41
+            kappa[:edges, 5:] = 5 * 301  # of a border of eight
+            assert plans.is_sharp(turn(kappa), turn(none)) == wanted
+            assert not plans.is_sharp(turn(kappa * 4 / 5), turn(none))  # up to 4 the softest flows
+        step = np.where(np.arange(12) < 5, 5.0, 5 * 300.0) * np.ones((8, 1))
+        assert not plans.is_sharp(turn(step), turn(none))
+        assert plans.is_sharp(turn(np.where(step > 5, 5 * 301.0, 5)), turn(none))
