@@ -13,6 +13,7 @@ from solver.gl.device import Device
 from solver.gl.field import Field
 from solver.grid import Grid
 from solver.packing import unpacked
+from solver.pressure.graph import OVERCORRECTION, Graph, coarsen_links, graphs_below, has_one_piece_a_block, links_of
 from solver.pressure.level import GridLevel
 from solver.pressure.projection import Projection
 from solver.pressure.transform import FastDiagonalization
@@ -380,3 +381,109 @@ def test_a_trend_does_not_carry_noise_on(device: Device) -> None:
         parts.append(left / np.linalg.norm(divergence(closed(noise, np.zeros((96, 128), bool)))))
         pressure.project(field, 4, warm=True)
     assert max(parts[12:]) < 1.6
+
+
+# -- pieces of cells and the links between them, by brute force -------------------------------------------------------
+
+
+def linked(seed: int, size: tuple[int, int] = (7, 9)) -> tuple[np.ndarray, np.ndarray]:
+    """The links between cells of which some are closed, some in part."""
+    closed = np.random.default_rng(seed).choice([0, 0, 0.3, 1], size).astype(np.float32)
+    return links_of(closed)
+
+
+def matrix_of(graph: Graph) -> np.ndarray:
+    """The links of a graph as a symmetric matrix."""
+    matrix = np.zeros((len(graph.place),) * 2)
+    for (one, other), weight in zip(graph.ends.tolist(), graph.weight.tolist(), strict=True):
+        matrix[one, other] += weight
+        matrix[other, one] += weight
+    return matrix
+
+
+def test_a_link_is_as_open_as_the_cell_beside_it_that_is_closed_more() -> None:
+    closed = np.random.default_rng(1).random((5, 7)).astype(np.float32)
+    left, up = links_of(closed)
+    for y, x in np.ndindex(5, 7):
+        assert left[y, x] == pytest.approx(1 - max(closed[y, x], closed[y, x - 1]) if x else 0)
+        assert up[y, x] == pytest.approx(1 - max(closed[y, x], closed[y - 1, x]) if y else 0)
+
+
+@pytest.mark.parametrize("size", [(6, 8), (7, 9), (5, 8), (1, 6)])
+def test_links_between_blocks_are_the_means_of_those_between_their_cells(size: tuple[int, int]) -> None:
+    left, up = linked(2, size)
+    for links, coarse, step in ((left, coarsen_links(left, up)[0], (0, 1)), (up, coarsen_links(left, up)[1], (1, 0))):
+        assert coarse.shape == tuple(-(-side // 2) for side in size)
+        for y, x in np.ndindex(*coarse.shape):
+            along = [(2 * y + k * step[1], 2 * x + k * step[0]) for k in (0, 1)]
+            values = [links[place] if place[0] < size[0] and place[1] < size[1] else 0 for place in along]
+            assert coarse[y, x] == pytest.approx(sum(values) / 2)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_whether_the_cells_of_each_block_are_one_piece(seed: int) -> None:
+    """Those without any link count to none; from few closed cells on, to many."""
+    rng = np.random.default_rng(seed)
+    closed = (rng.random((5, 6)) < 0.03 * (seed % 10)).astype(np.float32)
+    left, up = links_of(closed)
+    graph = Graph.of_cells(left, up, 1.0)
+    matrix, block = matrix_of(graph) > 0, graph.place // 2
+    together = matrix & (block[:, None] == block).all(axis=-1)
+    piece = connected_components(sparse.csr_matrix(together))[1]
+    alone = ~matrix.any(axis=1)
+    pieces = {(*where, number) for where, number, none in zip(block.tolist(), piece, alone, strict=True) if not none}
+    assert has_one_piece_a_block(left, up) == (len(pieces) == len({where[:2] for where in pieces}))
+
+
+@pytest.mark.parametrize("aspect", [1.0, 0.7])
+@pytest.mark.parametrize("seed", range(4))
+def test_a_coarser_graph_has_the_pieces_of_blocks_and_all_links_between_them(seed: int, aspect: float) -> None:
+    graph = Graph.of_cells(*linked(seed), aspect)
+    left, up = linked(seed)
+    assert graph.weight.sum() == pytest.approx(left.sum() + aspect**2 * up.sum(), rel=1e-6)
+    coarse, parent = graph.coarsen()
+    matrix, block = matrix_of(graph), graph.place // 2
+    together = (matrix > 0) & (block[:, None] == block).all(axis=-1)
+    piece = connected_components(sparse.csr_matrix(together))[1]
+    between = np.where(piece[:, None] != piece, matrix, 0)
+    for number in range(piece.max() + 1):
+        mine = piece == number
+        parents = set(parent[mine].tolist())
+        assert len(parents) == 1
+        assert (parents == {-1}) == (not between[mine].any())
+    kept = parent >= 0
+    members = np.zeros((len(coarse.place), len(parent)))
+    members[parent[kept], np.flatnonzero(kept)] = 1
+    np.testing.assert_allclose(matrix_of(coarse), members @ between @ members.T / OVERCORRECTION, atol=1e-6)
+    np.testing.assert_array_equal(coarse.place[parent[kept]], block[kept])
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_graphs_below_a_grid_lead_from_each_cell_down_to_few_unknowns(seed: int) -> None:
+    cells = Graph.of_cells(*linked(seed, (14, 17)), 1.0)
+    graphs, parents = graphs_below(cells, 6)
+    assert len(graphs[-1].place) <= 6
+    assert all(len(graph.place) > 6 for graph in graphs[:-1])
+    assert len(parents) == len(graphs)
+    for (finer, coarser), parent in zip(zip([cells, *graphs], graphs, strict=False), parents, strict=True):
+        kept = parent >= 0
+        np.testing.assert_array_equal(coarser.place[parent[kept]], finer.place[kept] // 2)
+        if finer is not cells:  # side by side, and what stands for nothing last
+            assert (np.diff(np.where(kept, parent, len(coarser.place))) >= 0).all()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_graph_is_solved_on_each_of_its_components_and_knows_its_neighbours(seed: int) -> None:
+    graph = Graph.of_cells(*linked(seed, (4, 5)), 0.8)
+    links = matrix_of(graph)
+    matrix = links - np.diag(links.sum(axis=1))
+    rhs = matrix @ np.random.default_rng(seed).standard_normal(len(links))  # sums to 0 in each component
+    found = graph.inverse() @ rhs
+    np.testing.assert_allclose(matrix @ found, rhs, atol=1e-9)
+    np.testing.assert_allclose(found, np.linalg.pinv(matrix) @ rhs, atol=1e-9)  # and so does the solution
+    begins, counts, listed = graph.neighbours()
+    again = np.zeros_like(links)
+    for one, (begin, count) in enumerate(zip(begins, counts, strict=True)):
+        for other, weight in listed[begin : begin + count]:
+            again[one, int(other)] += weight
+    np.testing.assert_allclose(again, links)

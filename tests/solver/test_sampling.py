@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import itertools
+import math
+from typing import Any
 
 import cv2
 import numpy as np
@@ -11,10 +13,11 @@ from PIL import Image
 from scipy import ndimage
 
 from solver.gl.device import Device
+from solver.gl.passes import Region
 from solver.grid import Grid
 from solver.resample.plan import Edges, GivenMap, Plan, Sampling, SamplingError
 from solver.resample.sampler import Sampler
-from solver.resample.tiles import Piece
+from solver.resample.tiles import Piece, Tiling, edge_index, halves_of, overlap, rectangles
 from solver.resample.transfer import PictureTexture
 from solver.warp.map import WarpMap
 
@@ -490,3 +493,87 @@ def test_a_picture_that_is_read_only_stays_uploaded_and_no_other_is_taken_for_it
     np.testing.assert_array_equal(sampler.apply(warp, first, how=plain), Sampler(device).apply(warp, first, how=plain))
     second[:] = 7
     np.testing.assert_array_equal(sampler.apply(warp, second), Sampler(device).apply(warp, second))
+
+
+# -- what pictures are cut into, by brute force -----------------------------------------------------------------------
+
+
+def covered(size: tuple[int, int], regions: list[Region]) -> np.ndarray:
+    """How many of some regions lie over each of the pixels (h, w)."""
+    count = np.zeros(size[::-1], int)
+    for x, y, width, height in regions:
+        count[y : y + height, x : x + width] += 1
+    return count
+
+
+@pytest.mark.parametrize("height", range(1, 12))
+def test_both_halves_of_a_region_make_it_up_and_no_pair_is_torn_apart(height: int) -> None:
+    for width in range(1, 24):
+        if width <= 2 and height == 1:
+            continue  # which is not cut
+        halves = halves_of((4, 3, width, height))
+        assert (covered((30, 20), [*halves]) == covered((30, 20), [(4, 3, width, height)])).all()
+        (x, y, *one), (other_x, other_y, *other) = halves
+        assert min(*one, *other) > 0
+        if width >= height and width > 2:
+            assert (y == other_y) == (x % 2 == other_x % 2 == 0)
+            assert abs(one[0] - other[0]) <= 3
+        else:
+            assert x == other_x
+            assert abs(one[1] - other[1]) <= 1
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_what_is_true_in_a_mask_is_cut_into_rectangles_that_do_not_overlap(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    mask = rng.random((9, 14)) < 0.15 * (seed + 1)
+    found = rectangles(mask)
+    np.testing.assert_array_equal(covered((14, 9), found.tolist()), mask)
+    # No two of them could be one: below none stands one as wide, and none ends where another begins.
+    ends = {(x, x + width, y + height) for x, y, width, height in found.tolist()}
+    assert not any((x, x + width, y) in ends for x, y, width, _ in found.tolist())
+    assert not (mask & np.pad(mask, ((0, 0), (1, 0)))[:, :-1])[found[:, 1], found[:, 0]].any()
+
+
+def test_rectangles_of_nothing_and_of_all() -> None:
+    assert rectangles(np.zeros((3, 4), bool)).shape == (0, 4)
+    assert rectangles(np.ones((3, 4), bool)).tolist() == [[0, 0, 4, 3]]
+
+
+def test_what_two_rectangles_have_in_common() -> None:
+    rng = np.random.default_rng(7)
+    for one, other in zip(rng.integers(1, 9, (60, 4)).tolist(), rng.integers(1, 9, (60, 4)).tolist(), strict=True):
+        x, y, width, height = overlap(one, other)
+        wanted = (covered((20, 20), [tuple(one), tuple(other)]) == 2).sum()
+        assert max(width, 0) * max(height, 0) == wanted
+        if wanted:
+            assert (covered((20, 20), [(x, y, width, height), tuple(one), tuple(other)]) == 3).sum() == wanted
+
+
+@pytest.mark.parametrize(("edges", "pad"), [("wrap", "wrap"), ("mirror", "symmetric")])
+@pytest.mark.parametrize("count", [1, 2, 5])
+def test_the_pixel_that_stands_for_one_beyond_the_edge_is_the_one_of_a_padded_picture(
+    edges: str, pad: Any, count: int
+) -> None:
+    index = np.arange(-17, count + 17)
+    np.testing.assert_array_equal(edge_index(index, count, edges), np.pad(np.arange(count), 17, pad))
+
+
+@pytest.mark.parametrize("size", [(1, 1), (2, 1), (64, 48), (65, 49), (127, 95), (1000, 3), (641, 481)])
+def test_tiles_are_as_few_as_may_be_and_all_alike_and_of_whole_pairs(size: tuple[int, int]) -> None:
+    tiling = Tiling(4000, (64, 48), 1024)
+    tile = tiling.tile_of(size)
+    assert tile[0] % 2 == 0
+    for side, wanted, most in zip(size, tile, tiling.tile, strict=True):
+        assert wanted <= most
+        assert math.ceil(side / wanted) == math.ceil(side / most)
+
+
+@pytest.mark.parametrize(
+    ("size", "fits"),
+    [((80, 50), True), ((81, 50), False), ((1023, 3), True), ((1024, 3), False), ((3, 1023), True), ((3, 1024), False)],
+)
+def test_a_picture_fits_up_to_so_many_pixels_and_one_less_than_the_largest_texture(
+    size: tuple[int, int], fits: bool
+) -> None:
+    assert Tiling(4000, (64, 48), 1024).fits(size) == fits
