@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Literal
 
 import numpy as np
@@ -338,6 +339,58 @@ def test_saved_state_goes_on_bit_for_bit(device: Device, side: int, moments: tup
         for made in (state, template, resumed):
             made.release()
         other.release()
+    warp.release()
+
+
+def held_anew(warp: WarpMap) -> None:
+    mask = np.zeros((48, 48), np.uint8)
+    mask[10:30, 20:40] = 255
+    frozen = warp.device.upload(mask)
+    warp.hold(frozen)
+    warp.advance_prescribed(vortex, 0.05)
+    frozen.release()
+
+
+def bump() -> np.ndarray:
+    """A displacement that leads nothing out of the picture."""
+    x, y = Grid(48, 48).centres()
+    return 0.05 * (np.sin(np.pi * x) * np.sin(np.pi * y))[..., None] * np.array([1.0, -0.5])
+
+
+CHANGES: dict[str, Callable[[WarpMap], None]] = {
+    "a step": lambda warp: warp.advance_prescribed(vortex, 0.02),
+    "another map": lambda warp: warp.set(bump()),
+    "none": WarpMap.reset,
+    "another one after a mask": held_anew,
+    "a brush that restores": lambda warp: warp.restore_under((0.5, 0.5), 0.3),
+    "what it closes": WarpMap.close,
+    "what it takes in": WarpMap.remap,
+    "other cells": lambda warp: warp.move_to(Grid(40, 40)),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_after_every_change_a_map_is_composed_anew(device: Device, change: str) -> None:
+    """Of its own texels and of others; and what stands for all of it differs where it leads elsewhere."""
+    warp = WarpMap(device, Grid(48, 48), (96, 96))
+    for step in range(12):
+        warp.advance_prescribed(vortex, 0.02, 0.02 * step)
+    saved = warp.save()
+    wants = [((96, 96), False), ((40, 31), False), ((40, 31), True)]
+    for changes in (CHANGES[change], lambda warp: warp.restore(saved)):
+        before = [warp.composed(size, exact).get() for size, exact in wants]
+        version, leads = warp.version, warp.leads
+        changes(warp)
+        found = [warp.composed(size, exact).get() for size, exact in wants]
+        for (size, exact), shown in zip(wants, found, strict=True):
+            target = device.field(size, 2)
+            warp.draw(target, (0.0, 0.0), target.texel, exact)
+            np.testing.assert_allclose(shown, target.get(), atol=1e-6)
+            target.release()
+        if max(map(difference, found, before)) > 1e-3:
+            assert version != warp.version
+            assert leads != warp.leads
+    saved.release()
     warp.release()
 
 
