@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import ctypes
+import gc
 import json
 import os
 import subprocess
 import sys
 from collections import Counter
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +20,11 @@ from PIL import Image
 
 from solver.gl.context import GPU, ContextError, NoSuchDevice
 from solver.gl.device import MOST_PASSES, Device
-from solver.gl.field import FieldPool
-from solver.gl.passes import Pass
+from solver.gl.field import Field, FieldPool
+from solver.gl.passes import Pass, Region
 from solver.gl.program import compile_program
+from solver.gl.reduction import Reduction
+from solver.gl.tiled import TiledField
 from support.gl_objects import living
 
 ROOT = Path(__file__).parents[2]
@@ -293,3 +297,172 @@ def test_a_driver_that_has_stopped_is_told_as_that_and_not_as_a_bug(device: Devi
     finally:
         egl.eglMakeCurrent(display, surface, surface, context)
     kept.release()
+
+
+@pytest.fixture(scope="module")
+def second() -> Iterator[Device]:
+    with Device.headless() as second:
+        for number in range(20):  # so that the next is called otherwise than the next of the other device
+            second.pass_("gl/copy.frag", NUMBER=number)
+        yield second
+
+
+def dropped(device: Device, other: Device) -> Callable[[], object]:
+    """What Python drops while another device is in use, which has textures of the same names, is given back later."""
+    fields = [device.upload(GIVEN) for _ in range(5)]
+    other.use()
+    fields.clear()
+    gc.collect()
+    return device.collect
+
+
+def cleared(field: Field) -> Callable[[], object]:
+    def clear() -> None:
+        field.clear(3.0)
+        np.testing.assert_array_equal(field.get(), 3)
+        field.set(GIVEN)
+
+    return clear
+
+
+def copied(device: Device, field: Field) -> Callable[[], object]:
+    target = device.field((4, 3))
+
+    def copy() -> None:
+        target.copy_from(field)
+        np.testing.assert_array_equal(target.get(), GIVEN)
+        target.release()
+
+    return copy
+
+
+def drawn_into(device: Device, field: Field) -> Callable[[], object]:
+    """A framebuffer that is not a field's, as a window's."""
+    target, copy = device.field((4, 3)), device.pass_("gl/copy.frag")
+    framebuffer = target.framebuffer
+
+    def draw() -> None:
+        copy.draw_into(framebuffer, field=field, offset=(0.0, 0.0))
+        np.testing.assert_array_equal(target.get(), GIVEN)
+        target.release()
+
+    return draw
+
+
+def drawn(device: Device, field: Field) -> Callable[[], object]:
+    target, copy = device.field(field.size), device.pass_("gl/copy.frag")
+
+    def draw() -> None:
+        copy(target, field=field, offset=(0.0, 0.0))
+        np.testing.assert_array_equal(target.get(), GIVEN)
+        target.release()
+
+    return draw
+
+
+def read(field: Field, region: Region | None = None) -> Callable[[], object]:
+    left, top, width, height = region or (0, 0, 4, 3)
+    wanted = GIVEN[top : top + height, left : left + width]
+    return lambda: np.testing.assert_array_equal(field.get(region), wanted)
+
+
+def summed(device: Device) -> Callable[[], object]:
+    field, sums = device.upload(np.ones((3, 100), np.float32)), Reduction(device, (100, 3), 1, "sum")
+    return lambda: np.testing.assert_array_equal(sums(field), 300)
+
+
+def saved(device: Device, blank: bool) -> Callable[[], object]:
+    tiled = TiledField(device, (600, 300), 2, "tiled")
+    if not blank:
+        tiled.clear(1.0, 2.0)
+    kept = tiled.save()
+    tiled.clear(5.0, 6.0)
+
+    def restore() -> None:
+        tiled.restore(kept)
+        kept.release()
+        np.testing.assert_array_equal(tiled.get((599, 299, 1, 1)), [[[0.0, 0.0] if blank else [1.0, 2.0]]])
+        tiled.release()
+
+    return restore
+
+
+def compiled(device: Device, field: Field) -> Callable[[], object]:
+    target = device.field((4, 3))
+
+    def make() -> None:
+        copy = device.pass_("gl/copy.frag", NUMBER=77)
+        copy(target, field=field, offset=(0.0, 0.0))
+        np.testing.assert_array_equal(target.get(), GIVEN)
+        target.release()
+
+    return make
+
+
+def framed(device: Device) -> Callable[[], object]:
+    uploaded = device.upload(GIVEN)
+
+    def frame() -> None:
+        assert uploaded.framebuffer.size == (4, 3)
+        np.testing.assert_array_equal(uploaded.get(), GIVEN)
+        uploaded.release()
+
+    return frame
+
+
+def put_together(device: Device) -> Callable[[], object]:
+    """A framebuffer of two textures is forgotten with the first of them."""
+    one, other = device.upload(GIVEN), device.upload(GIVEN)
+    device.framebuffer((one.texture, other.texture))
+
+    def release() -> None:
+        one.release()
+        np.testing.assert_array_equal(other.get(), GIVEN)
+        other.release()
+
+    return release
+
+
+GIVEN = np.arange(12, dtype=np.float32).reshape(3, 4)
+USES: dict[str, Callable[[Device, Field, Device], Callable[[], object]]] = {
+    "made": lambda device, field, other: lambda: device.field((4, 3)).get(),
+    "uploaded": lambda device, field, other: lambda: device.upload(GIVEN + 1),
+    "read": lambda device, field, other: read(field),
+    "read in part": lambda device, field, other: read(field, (1, 1, 2, 1)),
+    "set": lambda device, field, other: lambda: field.set(GIVEN),
+    "set in part": lambda device, field, other: lambda: field.set(GIVEN[1:2, 1:3], (1, 1, 2, 1)),
+    "cleared": lambda device, field, other: cleared(field),
+    "drawn": lambda device, field, other: drawn(device, field),
+    "compiled": lambda device, field, other: compiled(device, field),
+    "made a framebuffer of": lambda device, field, other: framed(device),
+    "drawn elsewhere": lambda device, field, other: drawn_into(device, field),
+    "copied": lambda device, field, other: copied(device, field),
+    "released": lambda device, field, other: device.upload(GIVEN).release,
+    "put together": lambda device, field, other: put_together(device),
+    "dropped": lambda device, field, other: dropped(device, other),
+    "summed": lambda device, field, other: summed(device),
+    "saved": lambda device, field, other: saved(device, False),
+    "saved empty": lambda device, field, other: saved(device, True),
+}
+
+
+@pytest.mark.parametrize("use", USES)
+def test_whatever_is_done_with_a_device_is_done_in_its_own_context(device: Device, second: Device, use: str) -> None:
+    """Another one was used last, and has as many fields, of the same names to OpenGL: it keeps what is in them."""
+    field, theirs = device.upload(GIVEN), [second.upload(GIVEN * number) for number in range(40)]
+    counted = use in ("released", "dropped", "put together", "saved", "saved empty")
+    before = living(device, "Texture") if counted else None
+    for one in (field, *theirs):
+        one.get()  # which makes it a framebuffer
+    done = USES[use](device, field, second)
+    second.use()
+    done()
+    second.use()
+    assert second.ctx.error == "GL_NO_ERROR"
+    for number, their in enumerate(theirs):
+        np.testing.assert_array_equal(their.get(), GIVEN * number)
+        their.release()
+    np.testing.assert_array_equal(field.get(), GIVEN)
+    if counted:
+        assert living(device, "Texture") == before
+    field.release()
