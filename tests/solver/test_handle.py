@@ -107,3 +107,53 @@ def test_whether_it_stays_short_of_an_edge_is_asked_of_where_it_goes_last(
     shape = Shape.of(Handle((0.5, 0.5), to, duration=1.0, keys=keys, points=points), (1.0, 1.0), 0.02)
     short = shape.short_of_edges(shape.led)
     assert short > 0.01 if is_short else short == 0
+
+
+LINE = ((0.3, 0.4), (0.5, 0.45), (0.7, 0.3))
+
+
+@pytest.mark.parametrize(
+    "handle",
+    [
+        Handle((0.5, 0.5)),
+        Handle((0.5, 0.5), radius=0.2, rotate=30.0),
+        Handle((0.5, 0.4), points=LINE),
+        Handle((0.5, 0.4), points=LINE, closed=True, rotate=30.0),
+    ],
+    ids=["point", "ring", "line", "loop"],
+)
+def test_how_far_away_a_handle_is_by_what_it_leads(handle: Handle) -> None:
+    """A point and a line by the farthest of their points; a ring by its middle, and how far it is turned and scaled."""
+    shape = Shape.of(handle, (1.0, 0.8))
+    ends = shape.led
+    assert (len(ends) > 1) == bool(handle.points or handle.rotate)
+    assert shape.is_ring == (not handle.points and handle.rotate is not None)
+    assert shape.away(ends, ends) == 0
+    assert shape.away(np.add(ends, (0.03, -0.04)), ends) == pytest.approx(0.05)
+    for angle, scale in ((0.02, 1.0), (0.0, 1.03), (0.02, 1.03)):
+        turn = scale * np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
+        places = ends[0] + (ends - ends[0]) @ turn
+        moved = np.hypot(*(places - ends).T)
+        if shape.is_ring:
+            arm = scale * handle.radius / 4
+            turned = arm * math.hypot(math.sin(angle) / scale, scale - 1)
+            assert shape.away(places, ends) == pytest.approx(turned, rel=1e-3)
+            assert shape.away(np.add(places, (0.03, -0.04)), ends) == pytest.approx(0.05 + turned, rel=1e-3)
+            assert shape.grown(ends, places) == pytest.approx(scale)
+        else:
+            assert shape.away(places, ends) == pytest.approx(moved.max())
+
+
+def test_the_middle_of_what_is_led_and_where_its_place_has_come_to() -> None:
+    """Of a line the place keeps to its points, turned and scaled as these are; of all else it is the first of them."""
+    line = Shape.of(Handle((0.6, 0.5), points=LINE), (1.0, 0.8))
+    assert line.middle(line.led) == pytest.approx((0.6, 0.5))
+    assert line.middle(np.add(line.led, (0.1, 0.05))) == pytest.approx((0.7, 0.55))
+    assert line.place(line.led, line.led) == pytest.approx((0.6, 0.5))
+    turn = 1.3 * np.array([[math.cos(0.4), math.sin(0.4)], [-math.sin(0.4), math.cos(0.4)]])
+    places = (0.4, 0.3) + (line.led - (0.2, 0.1)) @ turn
+    assert line.place(places, line.led) == pytest.approx((0.4, 0.3) + (np.array((0.6, 0.5)) - (0.2, 0.1)) @ turn)
+    ring = Shape.of(Handle((0.5, 0.5), radius=0.2, rotate=30.0), (1.0, 0.8))
+    for shape in (ring, Shape.of(Handle((0.5, 0.5)), (1.0, 0.8))):
+        assert shape.middle(shape.led + 0.1) == pytest.approx((0.6, 0.6))
+        assert shape.place(shape.led + 0.1, shape.led) == pytest.approx((0.6, 0.6))

@@ -9,7 +9,17 @@ import pytest
 from scipy import fft, ndimage
 
 from solver.brush.brush import Brush, Tip
-from solver.brush.push import FIRM_CARRIED, LOOSEST_CARRIED, Push, Slip, gain_compensation, quick_slip, slip_factor
+from solver.brush.push import (
+    FIRM_CARRIED,
+    LOOSEST_CARRIED,
+    Push,
+    Slip,
+    coasting,
+    gain_compensation,
+    quick_slip,
+    slip_factor,
+    strain_limit,
+)
 from solver.fluid import Fluid
 from solver.gl.device import Device
 from solver.grid import Grid
@@ -234,6 +244,30 @@ def test_a_local_push_from_beyond_the_edge_moves_nothing_against_it(device: Devi
 @pytest.mark.parametrize(("radii", "part"), [(0.0, 1.0), (0.7, 1.0), (1.2, 0.3 + 0.7 / 1.5), (1e4, 0.3)])
 def test_a_stroke_holds_fast_for_seven_tenths_of_a_radius_and_slips_to_three_tenths(radii: float, part: float) -> None:
     assert slip_factor(radii) == pytest.approx(part, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("drag", "viscosity", "radii"),
+    [(2.0, 0.0, 1.0), (0.0, 0.005, 1 / 3), (3.0, 0.005, 2 / 9), (0.0, 0.0, 2.0), (0.5, 0.0, 2.0), (1.0, 0.0, 2.0)],
+)
+def test_how_far_a_fluid_goes_on_without_the_brush(drag: float, viscosity: float, radii: float) -> None:
+    """From a speed of 0.2: slowed by drag and by viscosity, 12 / radius^2 of it, but for a second at most."""
+    tip = Tip((0.5, 0.5), (0.512, 0.484), radius=0.1)
+    assert coasting(tip, 0.1, drag, viscosity) == pytest.approx(radii)
+
+
+@pytest.mark.parametrize(
+    ("travelled", "coasts", "part"),
+    [
+        (0.0, 0.0, 0.68), (0.6, 0.0, 0.78), (1.92, 0.0, 1.0), (50.0, 0.0, 1.0),
+        (0.0, 1.0, 0.68 / 1.5 / 1.25), (50.0, 1.0, 1 / 1.25), (0.0, 0.4, 0.68 / 1.2 / 1.1),
+        (50.0, 1.5, 1 / (1.375 + 1.5)), (0.0, 1.5, 0.68 / 1.75 / (1.375 + 1.5)), (50.0, 9.0, 1 / (1.375 + 1.5)),
+    ],
+)  # fmt: skip
+def test_how_much_a_push_may_strain_grows_with_its_path_and_falls_with_how_far_the_fluid_coasts(
+    travelled: float, coasts: float, part: float
+) -> None:
+    assert strain_limit(travelled, coasts) == pytest.approx(part)
 
 
 @pytest.mark.parametrize(
