@@ -525,6 +525,27 @@ def test_of_a_change_at_the_tick_where_one_goes_on_the_settings_stay_and_what_it
     assert cut_off(Recipe(duration=9.0, change=(done_only,)), 4).change == ()
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "picture = {}",
+        "map = {}",
+        "[[freeze]]\nkind = 'picture'\npicture = {}",
+        "[[viscosity]]\nkind = 'picture'\nscale = 1\npicture = {}",
+        "[[freeze]]\nkind = 'picture'\nsegment = {{ mask = {} }}",
+        "[[force]]\nkind = 'field'\npicture = {}",
+        "[[force]]\nkind = 'gradient'\npicture = {}",
+        "[[mask]]\nkind = 'picture'\nof = 'frozen'\ntick = 0\npicture = {}",
+    ],
+)
+def test_no_picture_is_called_nothing_or_has_a_nul_in_its_name(text: str):
+    Recipe.parse(text.format("'a.png'"))
+    with pytest.raises(UserError, match="no file has a NUL in its name"):
+        Recipe.parse(text.format('"a\\u0000.png"'))
+    with pytest.raises(UserError, match="must "):
+        Recipe.parse(text.format("''"))
+
+
 @pytest.mark.parametrize(("tick", "ticks"), [(0, 1), (1, 1), (2, 2), (7, 7)])
 def test_what_is_cut_off_lasts_up_to_there_or_one_tick(tick: int, ticks: int):
     cut = cut_off(Recipe(stroke=(push((0, 0, 0, 1), (9, 1, 0, 1)),), duration=1.0), tick)

@@ -251,7 +251,9 @@ def test_of_many_passes_those_used_last_stay_compiled_and_the_others_are_compile
             assert copied(0) is first
         full = living(device, *before)
         assert full["Program"] == before["Program"] + MOST_PASSES - 2
-        for number in range(MOST_PASSES, 2 * MOST_PASSES):
+        copied(MOST_PASSES)
+        assert copied(0) is first, "the one that was made first has been used after all others"
+        for number in range(MOST_PASSES + 1, 2 * MOST_PASSES + 1):
             copied(number)
         assert living(device, *before) == full + Counter({"Program": 2, "VertexArray": 2})  # these two are held here
         field.clear()

@@ -430,8 +430,7 @@ def test_whether_the_cells_of_each_block_are_one_piece(seed: int) -> None:
     matrix, block = matrix_of(graph) > 0, graph.place // 2
     together = matrix & (block[:, None] == block).all(axis=-1)
     piece = connected_components(sparse.csr_matrix(together))[1]
-    alone = ~matrix.any(axis=1)
-    pieces = {(*where, number) for where, number, none in zip(block.tolist(), piece, alone, strict=True) if not none}
+    pieces = {(*block[one].tolist(), piece[one]) for one in np.flatnonzero(matrix.any(axis=1))}
     assert has_one_piece_a_block(left, up) == (len(pieces) == len({where[:2] for where in pieces}))
 
 
