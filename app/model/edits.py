@@ -8,7 +8,7 @@ from typing import Any
 from app.errors import UserError
 from app.model.handles import MOST_HANDLES, MOST_LINES, RecipeHandle, RecipePin, labelled
 from app.model.mask_edits import MaskStroke
-from app.model.recipe import Recipe
+from app.model.recipe import DensitySettings, Recipe, Stop
 from app.model.schema import written
 from app.model.strokes import Change, Stroke
 from app.model.toml import MOST_NUMBERS, MOST_WORDS
@@ -45,9 +45,9 @@ def cut_off(recipe: Recipe, tick: int) -> Recipe:
 
 
 def ending_at(recipe: Recipe, tick: int) -> Recipe:
-    """A recipe that ends at a tick; at 0, before anything has acted, by one in which nothing does."""
+    """A recipe that ends at a tick; at 0, before anything has acted, by one in which nothing does, or ends it."""
     if tick == 0:
-        recipe = cut_off(recipe, 0).edited(force=())
+        recipe = cut_off(recipe, 0).edited(force=(), density=DensitySettings(), stop=Stop())
     return recipe.edited(duration=max(tick, 1) * recipe.fluid.dt)
 
 

@@ -10,6 +10,7 @@ import pytest
 
 from app.media.auxiliary import Pictures
 from app.media.pictures import read_picture
+from app.model.edits import ending_at
 from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.progress import Progress
@@ -38,6 +39,25 @@ def test_what_nothing_moves_is_written_as_it_was(device: Device, tmp_path: Path,
     picture = Picture(SOFT[..., :channels])
     run(device, Job(Recipe.parse(RECIPE), picture, tmp_path, Outputs(tmp_path / "a.png")), Progress())
     np.testing.assert_array_equal(read_picture(tmp_path / "a.png").pixels, picture.pixels)
+
+
+def test_what_is_seen_at_the_start_is_written_as_it_was(device: Device, tmp_path: Path) -> None:
+    """A recipe lasts a step at least: in the one that is made for it nothing spreads or is fed, and nothing ends it."""
+    text = RECIPE + VORTEX + "[density]\nkappa = 0.01\nsource = [0.5, 1, 0.2]\n[stop]\nenergy_below = 1e-9\n"
+    recipe = ending_at(Recipe.parse(text), 0)
+    report = run(device, Job(recipe, Picture(SOFT), tmp_path, Outputs(tmp_path / "a.png")), Progress())
+    np.testing.assert_array_equal(read_picture(tmp_path / "a.png").pixels, SOFT)
+    assert report.verdict is None
+
+
+def test_a_map_to_begin_with_ends_nothing_at_the_start(device: Device, tmp_path: Path) -> None:
+    np.save(tmp_path / "m.npy", np.full((48, 64, 2), 0.1, np.float32))
+    recipe = Recipe.parse('map = "m.npy"\nduration = 0.2\nfluid = {grid = 32}\nstop = {displacement_above = 0.01}')
+    verdicts = []
+    for each in (recipe, ending_at(recipe, 0)):
+        outputs = Outputs(tmp_path / "a.png")
+        verdicts.append(run(device, Job(each, Picture(SOFT), tmp_path, outputs), Progress()).verdict)
+    assert [verdict is None for verdict in verdicts] == [False, True]
 
 
 def test_the_source_is_fed_by_the_second(device: Device) -> None:
