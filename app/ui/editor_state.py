@@ -74,6 +74,7 @@ class EditorState:
         inspector: the inspector is open, in a window that has room for it.
         over_narrow: it is open in one that has not.
         sections: which of its sections are open.
+        in_hand: which of them are about what is in hand, and stand on top.
         history_seen: the entry of the history that was scrolled to last.
         mask: the one that the inspector edits; that of the tool that was chosen last.
         mask_reach: by how much it is feathered, grown and shrunk, longer sides.
@@ -108,6 +109,7 @@ class EditorState:
     inspector: bool = True
     over_narrow: bool = False
     sections: dict[str, bool] = field(default_factory=dict)
+    in_hand: set[str] = field(default_factory=set)
     history_seen: int = -1
     mask: MaskName = "frozen"
     mask_reach: float = 0.02

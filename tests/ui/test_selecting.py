@@ -20,7 +20,7 @@ from app.model.mask_edits import FillMask, PictureMask
 from app.model.picture import Picture
 from app.model.recipe import Recipe
 from app.ui.editor_state import SELECT_BY
-from app.ui.events import Mods
+from app.ui.events import Mods, Move, Wheel
 from app.work.replay import Replay
 from solver.gl.device import Device
 from support.commands import Run
@@ -524,3 +524,27 @@ def test_the_section_of_the_tool_in_hand_stands_on_top(robot: Robot, widgets: Wi
     robot.editor.state.lanes.selected = {bar.which for bar in bars(robot.editor.session.recipe)}
     robot.frame(count=2)
     assert widgets.at["Handles and pins"].y < widgets.at["Fluid"].y
+
+
+@pytest.mark.parametrize(("tool", "words"), [("g", "Handles and pins"), ("m", "Selection")])
+def test_the_section_of_a_tool_is_seen_wherever_the_inspector_was_scrolled_to(
+    robot: Robot, widgets: Widgets, tool: str, words: str
+) -> None:
+    robot.key("g")
+    robot.drag((0.4, 0.5), (0.4, 0.5), steps=1)
+    robot.rest()
+    robot.key("p")
+    robot.frame(count=2)
+    rect = robot.editor.layout.inspector
+    assert rect is not None
+    robot.frame(Move(*rect.middle))
+    for _ in range(40):
+        robot.frame(Wheel(0, -3))
+    assert widgets.at["Fluid"].y < rect.y
+    robot.key(tool)
+    robot.frame(count=3)
+    assert rect.y <= widgets.at[words].y < widgets.at["Fluid"].y
+    robot.move(*rect.middle)
+    for _ in range(40):
+        robot.frame(Wheel(0, -3))
+    assert widgets.at[words].y < rect.y, "what stays in hand scrolls nothing"

@@ -63,14 +63,16 @@ def draw(
     """All sections, one below the other."""
     session = workspace.session
     handles = _about_handles(ui, workspace, state, do)
-    bars = _about_bars(ui, session, state)
+    bars, selection = _about_bars(ui, session, state), _about_selection(ui, workspace, state, selecting, do)
     # With another tool in hand it is below all else: what a push brings about in it moves nothing under the pointer.
     is_in_hand = state.tool_name == "handle" or bool(bars)
+    in_hand = [*selection, *(handles if is_in_hand else []), *bars]
     with ui.panel("inspector", rect, (16, 4), imgui.WindowFlags_.none), imgui_ctx.begin_child("sections"):
+        before, state.in_hand = state.in_hand, {name for name, *_ in in_hand}
+        if state.in_hand - before:  # what has come on top is seen, wherever one has scrolled to
+            imgui.set_scroll_y(0)
         for name, label, section, opened in (
-            *_about_selection(ui, workspace, state, selecting, do),
-            *(handles if is_in_hand else []),
-            *bars,
+            *in_hand,
             ("fluid", "Fluid", lambda: _fluid(ui, session, state), True),
             ("symmetry", "Symmetry", lambda: _symmetry(ui, state), False),
             ("view", "Overlays", lambda: _view(ui, state), True),
