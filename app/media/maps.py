@@ -244,7 +244,11 @@ def telling_of(path: str | os.PathLike[str]) -> Iterator[None]:
 
 
 def _known(path: str | os.PathLike[str], values: np.ndarray) -> np.ndarray:
-    """The values, both NaN where one is; raises `UserError` for infinite ones, or if none is left."""
+    """The values, both NaN where one is; raises `UserError` for infinite ones, or if none is left.
+
+    Those of 16 bits become ones of 32: in half precision `LARGEST` is infinite, and much of what is computed.
+    """
+    values = values.astype(np.float32) if values.dtype.itemsize < 4 else values
     bad = (np.abs(values) > LARGEST).any(axis=2)
     if bad.any():
         row, column = np.argwhere(bad)[0]

@@ -304,6 +304,20 @@ def test_values_that_are_infinite_in_32_bits_are_refused(tmp_path: Path) -> None
         read_map(tmp_path / "a.npy")
 
 
+@pytest.mark.parametrize("order", ["<", ">"])
+def test_an_array_of_16_bits_is_a_map_as_any(tmp_path: Path, order: str) -> None:
+    """What is infinite in it is refused as in another, and what is made of it is made in 32 bits."""
+    values = np.full((5, 7, 2), 300.0, f"{order}f2")
+    np.save(tmp_path / "a.npy", values)
+    read = read_map(tmp_path / "a.npy")
+    np.testing.assert_array_equal(read.values, values)
+    assert np.isfinite(read.values * 300).all()
+    values[2, 3] = np.inf
+    np.save(tmp_path / "a.npy", values)
+    with pytest.raises(UserError, match=r"1 of its pixels are infinite, the first at x 3, y 2"):
+        read_map(tmp_path / "a.npy")
+
+
 @pytest.mark.parametrize("ending", [".exr", ".tif", ".flo", ".npy"])
 def test_nan_is_kept(tmp_path: Path, ending: str):
     map_ = swirl(8, 9)
