@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import ChainMap
 from collections.abc import Callable
 from typing import Any
 
@@ -117,8 +118,8 @@ def check_size(recipe: Recipe, before: Recipe | None = None) -> None:
 def with_change(recipe: Recipe, tick: int, settings: dict[str, Any], lasts: bool) -> Recipe:
     """A recipe in which something is set at a tick; what does not last is done at once."""
     before = [change for change in recipe.change if change.tick != tick]
-    here = [change for change in recipe.change if change.tick == tick]
-    made = (here[-1] if here else Change(tick=tick)).model_copy(update=settings)
+    here = [change.model_dump(exclude_defaults=True) for change in recipe.change if change.tick == tick]
+    made = Change(tick=tick).model_copy(update=dict(ChainMap(settings, *reversed(here))))
     dt = recipe.fluid.dt
     if settings.get("reset_warp"):  # what holds the picture lets go of it
         handles, pins = (tuple(_ended(led, tick * dt) for led in all_) for all_ in (recipe.handle, recipe.pin))

@@ -553,6 +553,15 @@ def test_what_is_cut_off_lasts_up_to_there_or_one_tick(tick: int, ticks: int):
     assert [stroke.last_tick for stroke in cut.stroke] == ([ticks - 1] if tick else [])
 
 
+def test_what_is_set_at_a_tick_of_several_changes_leaves_what_the_others_set_there() -> None:
+    """A recipe that is written by hand may have a change for each thing that is set; the last of them was kept."""
+    several = "change = [{tick = 1, drag = 2}, {tick = 3, viscosity = 0, clear_masks = true}, {tick = 3, drag = 4}]"
+    recipe = with_change(Recipe.parse(f"duration = 1.0\n{several}"), 3, {"walls": "no-slip"}, lasts=True)
+    wanted = Change(tick=3, viscosity=0, drag=4, walls="no-slip", clear_masks=True)
+    assert recipe.change == (Change(tick=1, drag=2), wanted)
+    assert with_change(recipe, 3, {"drag": 0.0}, lasts=True).change[-1] == wanted.model_copy(update={"drag": 0.0})
+
+
 def test_what_a_reset_lets_go_of_is_held_again_where_the_reset_is_cut_off():
     """Who went back before the reset and painted lost the handles when the time of the reset had come."""
     text = "duration = 2.0\nhandle = [{at = [0.4, 0.5], keys = [[0.1, 0.5, 0.5]]}]\n"
