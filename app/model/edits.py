@@ -35,11 +35,13 @@ def cut_off(recipe: Recipe, tick: int) -> Recipe:
         tuple(led.model_copy(update={"end": None}) if led.end in resets else led for led in all_)
         for all_ in (handles, pins)
     )
+    changes = () if tick == 0 else recipe.change  # what is set at the very start is what the fluid begins as
     return recipe.edited(
+        fluid=recipe.fluid_at(0) if tick == 0 else recipe.fluid,
         stroke=tuple(part for stroke in recipe.stroke for part in stroke.cut(tick)),
         handle=handles,
         pin=pins,
-        change=tuple(kept for change in recipe.change if (kept := change.before(tick)) is not None),
+        change=tuple(kept for change in changes if (kept := change.before(tick)) is not None),
         mask=tuple(edit for edit in recipe.mask if edit.tick <= tick),
         duration=max(tick, 1) * dt,
     )

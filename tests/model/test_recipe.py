@@ -562,6 +562,16 @@ def test_what_is_set_at_a_tick_of_several_changes_leaves_what_the_others_set_the
     assert with_change(recipe, 3, {"drag": 0.0}, lasts=True).change[-1] == wanted.model_copy(update={"drag": 0.0})
 
 
+def test_what_is_set_at_the_very_start_is_what_is_gone_on_with_there():
+    """Where nothing else is left nothing has been done: the recording has no tick yet."""
+    setting = {"viscosity": 0.5, "drag": 0.25, "walls": "no-slip"}
+    at_start = {"tick": 0, "viscosity": 0.1, "reset_warp": True}, {"tick": 0} | setting, {"tick": 1, "drag": 9.0}
+    whole = Recipe.model_validate({"change": at_start, "duration": 9.0})
+    cut = cut_off(whole, 0)
+    assert (cut.change, cut.recorded) == ((), 0)
+    assert cut.fluid == cut.fluid_at(0) == whole.fluid_at(0) == whole.fluid.model_copy(update=setting)
+
+
 def test_what_a_reset_lets_go_of_is_held_again_where_the_reset_is_cut_off():
     """Who went back before the reset and painted lost the handles when the time of the reset had come."""
     text = "duration = 2.0\nhandle = [{at = [0.4, 0.5], keys = [[0.1, 0.5, 0.5]]}]\n"
