@@ -146,7 +146,9 @@ def test_what_gestures_make(tool: tools.Tool) -> None:
                 at=swap(0.2, 0.7), held=held if is_wide or held is None else turned_over(held),
             )  # fmt: skip
             assert tool.gesture is not None
-            first, *others = (touch if is_wide else touch._replace(x=touch.y, y=touch.x) for touch in touches)
+            first, *others = (
+                tools.Touch(touch.tick, *swap(touch.x, touch.y), touch.pressure, touch.shift) for touch in touches
+            )
             gesture = tool.gesture(press, first)
             next(gesture)
             for touch in others:
@@ -191,14 +193,15 @@ def test_the_windows_of_strokes_and_handles(number: int) -> None:
         to = x + dice.uniform(-0.05, 0.05), y + dice.uniform(-0.05, 0.05)
         acts = [windows.Act(each, tick, (strokes.Dab(x, y, *to, 1.0),)) for each in several]
         here, then = np.array([[x, y]]) * wholes[0].picture, np.array([to]) * wholes[0].picture
-        led = [windows.Led(512, 0.03, 0.02, here, then, number % 2 == 0, tick == 0)]
+        leading = number % 2 == 0, tick == 0
+        led = [windows.Led(512, 0.03, 0.02, here, then, *leading)]
         now = [
             windows.FlowWindow.of(acts, now[0], wholes[0], led),
             windows.FlowWindow.of(
-                [act._replace(dabs=tuple(strokes.Dab(d.y0, d.x0, d.y1, d.x1, 1.0) for d in act.dabs)) for act in acts],
+                [windows.Act(each, tick, (strokes.Dab(y, x, *flipped(*to), 1.0),)) for each in several],
                 now[1],
                 wholes[1],
-                [each._replace(here=each.here[:, ::-1], then=each.then[:, ::-1]) for each in led],
+                [windows.Led(512, 0.03, 0.02, here[:, ::-1], then[:, ::-1], *leading)],
             ),
         ]
         x, y = to
