@@ -102,7 +102,8 @@ def animation_writer(
         written: hears of each file of a sequence, by its number, see `sequence_writer`; of another file as of number 0,
             just before it appears.
     """
-    check_animation(path, fps / min(options.durations or [1]), options.codec)
+    for steps in set(options.durations or [1]):
+        check_animation(path, fps / steps, options.codec)
     like, quality = options.like, 95 if options.quality is None else options.quality
     if is_sequence(path):
         template = like or Picture(np.empty((0, 0, 1), np.uint8))

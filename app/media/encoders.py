@@ -10,6 +10,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from math import inf
 from pathlib import Path
 
 from app.errors import UserError
@@ -168,6 +169,9 @@ LARGEST = {
     "prores-422-hq": (65534, 65534), "gif": (65535, 65535), "webp": (FORMATS[".webp"].longest,) * 2,
 }  # fmt: skip
 
+# Seconds that a frame can be shown for, where a format has no number for more.
+LONGEST_SHOWN = {".gif": 655.35, ".webp": 16777.215, ".apng": 65535.0}
+
 # What ffmpeg's muxers were seen to write down and its readers to find again.
 ROLES = ("dub", "comment", "forced", "hearing impaired", "visual impaired")
 
@@ -282,6 +286,10 @@ def check_animation(
         raise UserError(f"Cannot write {path}: {suffix} holds {' or '.join(known)}, not {codec}; change --codec.")
     if suffix == ".gif" and fps > 50:
         raise UserError(f"Cannot write {path}: GIF shows at most 50 frames a second; lower the rate or use .apng.")
+    longest = LONGEST_SHOWN.get(suffix, inf)
+    if fps * longest < 1 - 1e-9:
+        most = f"{suffix} shows no frame for more than {longest:g} seconds"
+        raise UserError(f"Cannot write {path}: {most}; raise the rate or use .mp4.")
     used = codec or next(iter(known))
     most = LARGEST.get(used)
     if size is not None and most is not None and (size[0] > most[0] or size[1] > most[1]):

@@ -353,9 +353,34 @@ def test_names_tell_what_is_wanted():
         ("a.mp4", 0, "a frame rate of 0 is not between"),
         ("a.mp4", float("nan"), "a frame rate of nan is not between"),
         ("a.gif", 60, "at most 50 frames a second"),
+        ("a.gif", 0.0015, r"\.gif shows no frame for more than 655\.35 seconds; raise the rate or use \.mp4"),
+        ("a.webp", 5.9e-5, r"no frame for more than 16777\.2 seconds"),
+        ("a.apng", 1.5e-5, r"no frame for more than 65535 seconds"),
     ]:
         with pytest.raises(UserError, match=message):
             check_animation(name, rate)
+
+
+@pytest.mark.parametrize(("name", "seconds"), [("a.gif", "655.35"), ("a.webp", "16777.215"), ("a.apng", "65535")])
+def test_a_frame_is_shown_for_as_long_as_its_format_can_tell_and_refused_for_longer(
+    tmp_path: Path, name: str, seconds: str
+):
+    longest = Fraction(seconds)
+    frames = [np.full((4, 4, 3), value, np.uint8) for value in (0, 200)]
+    with animation_writer(tmp_path / name, 1 / longest) as write:
+        for frame in frames:
+            write(frame)
+    with Image.open(tmp_path / name) as image:  # another program's view
+        for number in range(2):
+            image.seek(number)
+            image.load()
+            assert image.info["duration"] == pytest.approx(float(longest) * 1000)
+    with (
+        pytest.raises(UserError, match="shows no frame for more than"),
+        animation_writer(tmp_path / f"2{name}", 2 / longest, AnimationOptions(durations=[1, 3])),
+    ):
+        pass
+    assert not (tmp_path / f"2{name}").exists()
 
 
 @pytest.mark.parametrize("name", ["a.mp4", "a.gif", "a.%04d.png"])
