@@ -58,7 +58,6 @@ class Work:
             return []
         if self.reel is None:
             self.reel = Reel(clip, partial(shown_pixels, largest=canvas.largest))
-            self._begin()
         self.reel.want(session.frame, session.is_moving)
         if (found := self.reel.best()) is not None and found[0] != self.frame:
             self.frame, self.pixels = found
@@ -86,6 +85,7 @@ class Work:
         if self.reel is not None:
             self.reel.close()
             self.reel = None
+            self._begin()  # as the next canvas does
         canvas, self.canvas = self.canvas, None
         if canvas is not None:
             self.session.release_gpu()

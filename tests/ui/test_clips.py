@@ -30,7 +30,7 @@ from app.work.jobs import Outputs
 from app.work.journal import Origin, project_of
 from app.work.tasks import Task
 from solver.gl.device import Device
-from support.editing import Robot, export_dialog, pattern
+from support.editing import Robot, export_dialog, pattern, small_project
 from support.widgets import Widgets
 
 FRAMES, RATE = 20, Fraction(25)
@@ -174,6 +174,28 @@ def test_thickness_by_brightness_is_that_of_the_frame_that_is_seen(viewer: Robot
     texels = viewer.editor.session.replay.masks.thickness.get().reshape(64, 2, 96, 2).mean(axis=(1, 3))
     grey = frame(12) @ [0.2126, 0.7152, 0.0722]
     assert np.corrcoef(texels.ravel(), grey.ravel())[0, 1] > 0.97
+
+
+@pytest.mark.parametrize("tick", [0, 5])
+def test_after_two_others_it_comes_back_with_the_frame_at_the_playhead(viewer: Robot, tmp_path: Path, tick: int):
+    """Also if the playhead went there when no other was drawn yet: it was the first, and the last was taken for it."""
+    workspace = viewer.editor.workspace
+    go_to(viewer, 12)
+    session = viewer.editor.session
+    session.seek(tick)
+    for _ in range(2):
+        workspace.open(small_project(tmp_path))
+        viewer.frame()
+    workspace.undo()
+    workspace.undo()
+    assert viewer.editor.session is session
+    viewer.frame()
+    viewer.until(lambda: not session.is_moving and not workspace.work.awaits_frame)
+    assert (session.frame, workspace.frames_after_first) == (tick, tick)
+    if tick:
+        np.testing.assert_array_equal(shown(viewer), frame(tick))
+    else:
+        assert workspace.work.picture is None
 
 
 def test_it_comes_back_with_its_project_and_is_missed_with_a_sentence(viewer: Robot, clip: Path, tmp_path: Path):
