@@ -176,7 +176,8 @@ def flag(name: str, says: str) -> Any:
 
 
 Output = Annotated[
-    Path, typer.Option("--output", "-o", metavar="OUT", help="File to write; its extension sets the format.")
+    Path,
+    typer.Option("--output", "-o", metavar="OUT", help="File to write; its extension sets the format.", readable=False),
 ]
 
 
@@ -209,7 +210,8 @@ def edit(
     run(file)
 
 
-# Inputs are `readable=False`: files are looked at where they are opened, so that one of many does not stop the others.
+# Paths are `readable=False`: files are looked at where they are opened, so that one of many does not stop the others,
+# and what cannot be read or written is told in sentences of our own.
 
 RecipeName = Annotated[
     str,
@@ -278,15 +280,23 @@ def render(
     output: Annotated[
         Path | None,
         typer.Option(
-            "--output", "-o", metavar="OUT", help="File to write; its extension sets the format. Default: out.png"
+            "--output",
+            "-o",
+            metavar="OUT",
+            help="File to write; its extension sets the format. Default: out.png",
+            readable=False,
         ),
     ] = None,
     image: Annotated[Path | None, typer.Option("--image", "-i", help="The same as PICTURE.", readable=False)] = None,
-    stats: Annotated[Path | None, typer.Option(help="Write energy, speed, det J and folds of each frame.")] = None,
+    stats: Annotated[
+        Path | None, typer.Option(help="Write energy, speed, det J and folds of each frame.", readable=False)
+    ] = None,
     map_: Annotated[
         Path | None,
         typer.Option(
-            "--map", help="Write the last frame's warp map (.exr .tif .flo .npy), or every frame's (m.%04d.exr)."
+            "--map",
+            help="Write the last frame's warp map (.exr .tif .flo .npy), or every frame's (m.%04d.exr).",
+            readable=False,
         ),
     ] = None,
     forward: Annotated[
@@ -313,7 +323,11 @@ def render(
     resume: Resume = False,
     states: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Folder to save states of the simulation in; later parts start from them."),
+        typer.Option(
+            metavar="DIR",
+            help="Folder to save states of the simulation in; later parts start from them.",
+            readable=False,
+        ),
     ] = None,
     animated: Annotated[bool, flag("--animated", "Write OUT.webp as an animation, not a still.")] = False,
     codec: Codec = None,
@@ -508,7 +522,9 @@ def _about(label: str, said: str) -> str:
 @cli.command()
 def fit(
     recipe: RecipeName,
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="FITTED.toml", help="Recipe to write.")],
+    output: Annotated[
+        Path, typer.Option("--output", "-o", metavar="FITTED.toml", help="Recipe to write.", readable=False)
+    ],
     pairs: Annotated[
         list[Path] | None,
         typer.Option(
@@ -521,11 +537,15 @@ def fit(
     ] = None,
     masks: Annotated[
         tuple[Path, Path] | None,
-        typer.Option(metavar="FROM TO", help="Two pictures: the white area of FROM gets the outline of that of TO."),
+        typer.Option(
+            metavar="FROM TO",
+            help="Two pictures: the white area of FROM gets the outline of that of TO.",
+            readable=False,
+        ),
     ] = None,
     arrived: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Write where the points arrive: .csv, .pts or .tps."),
+        typer.Option(metavar="FILE", help="Write where the points arrive: .csv, .pts or .tps.", readable=False),
     ] = None,
     image: Annotated[
         Path | None, typer.Option("--image", "-i", help="Picture to use instead of the recipe's.", readable=False)
@@ -689,9 +709,9 @@ def convert(
 
 @cli.command()
 def gallery(
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder to write to.")] = Path(
-        "gallery"
-    ),
+    output: Annotated[
+        Path, typer.Option("--output", "-o", metavar="DIR", help="Folder to write to.", readable=False)
+    ] = Path("gallery"),
     strokes: Annotated[
         bool, flag("--strokes", "Render the retouching jobs and posters instead, painted with brush strokes.")
     ] = False,

@@ -529,6 +529,21 @@ READ_ONLY = {
     ("convert", "m.npy", "-o", "shut/m.exr"): "Cannot write shut/m.exr: no permission",
     ("fit", "a.toml", "-o", "shut/b.toml"): "Cannot write shut/b.toml: no permission",
     ("gallery", "-o", "shut/gallery"): "Cannot write shut/gallery: no permission",
+    ("render", "a.toml", "secret.png", "-o", "x.png"): "Cannot read secret.png: no permission to read it",
+    ("apply", "secret.npy", "cat.png", "-o", "x.png"): "Cannot read secret.npy: no permission to read it",
+    ("apply", "m.npy", "secret.png", "-o", "x.png"): "Cannot read secret.png: no permission to read it",
+    ("convert", "secret.npy", "-o", "x.exr"): "Cannot read secret.npy: no permission to read it",
+    ("fit", "a.toml", "--pairs", "secret.csv", "-o", "b.toml"): "Cannot read secret.csv: no permission to read it",
+    ("fit", "a.toml", "--masks", "secret.png", "cat.png", "-o", "b.toml"): "Cannot read secret.png: no permission",
+    ("fit", "a.toml", "--masks", "cat.png", "secret.png", "-o", "b.toml"): "Cannot read secret.png: no permission",
+    ("fit", "a.toml", "-i", "secret.png", "-o", "b.toml"): "Cannot read secret.png: no permission to read it",
+    ("render", "a.toml", "-o", "secret.png"): "Cannot write secret.png: that file is read-only",
+    ("render", "a.toml", "-o", "x.png", "--map", "secret.npy"): "Cannot write secret.npy: that file is read-only",
+    ("render", "a.toml", "-o", "x.png", "--stats", "secret.csv"): "Cannot write secret.csv: that file is read-only",
+    ("convert", "m.npy", "-o", "secret.npy"): "Cannot write secret.npy: that file is read-only",
+    ("fit", "a.toml", "-o", "secret.toml"): "Cannot write secret.toml: that file is read-only",
+    ("gallery", "-o", "none"): "Cannot write none/figure-1-density.mp4: no permission",
+    ("fit", "a.toml", "-o", "b.toml", "--arrived", "secret.csv"): "Cannot write secret.csv: that file is read-only",
 }
 
 
@@ -541,7 +556,9 @@ def test_where_permissions_forbid_it_a_sentence_says_so_and_nothing_is_touched(f
         (folder / name).mkdir()
         (folder / name / "a.toml").write_text(RECIPE)
         (folder / name).chmod(mode)
-    (folder / "secret.png").chmod(0)
+    for name in ("secret.png", "secret.npy", "secret.csv", "secret.toml"):
+        (folder / name).touch()
+        (folder / name).chmod(0)
     (folder / "old.png").chmod(0o444)
     code = f"""
 import sys
@@ -564,6 +581,25 @@ for words in {list(READ_ONLY)!r}:
     for line, said in zip(told[::2], READ_ONLY.values(), strict=True):
         assert line.startswith("fluidwarp: ")
         assert said in line
+
+
+@needs_permissions
+@pytest.mark.parametrize("mode", [0, 0o444, 0o555], ids=oct)
+def test_where_no_states_may_be_kept_that_is_told_and_the_result_is_written(folder: Path, mode: int):
+    """Also where the folder may not be searched: that was called a bug, after the last frame."""
+    (folder / "states").mkdir()
+    (folder / "states").chmod(mode)
+    words = ["fluidwarp", "render", "a.toml", "-o", "x.png", "--states", "states"]
+    try:
+        told = as_a_user(f"import sys; sys.argv = {words!r}; from app import cli; cli.main()", folder)
+    finally:
+        (folder / "states").chmod(0o755)
+    (line,) = told.stderr.splitlines()
+    assert told.returncode == 0
+    assert line.startswith("fluidwarp: No more states are kept: Cannot write states/")
+    assert "no permission" in line
+    assert (folder / "x.png").exists()
+    assert not list((folder / "states").iterdir())
 
 
 # -- what does not ----------------------------------------------------------------------------------------------------

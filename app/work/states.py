@@ -63,11 +63,12 @@ class StoredStates:
         path = self._path(tick)
         if self._failed or tick == 0 or not (last or tick % EVERY == 0):
             return
-        if path.exists() and not path.is_symlink() and tick not in self._damaged:
+        # Not `Path.exists`, which raises where the folder may not be searched.
+        if os.path.exists(path) and not os.path.islink(path) and tick not in self._damaged:
             return
         parts: dict[str, Any] = self._replay.snapshot()
         try:
-            if path.is_symlink():  # what it leads to is somebody's, and no state of ours
+            if os.path.islink(path):  # what it leads to is somebody's, and no state of ours
                 raise UserError(f"{path} is a link; remove it")
             with replacing(path) as temporary, temporary.open("wb") as stream:
                 np.savez(stream, about=np.array(self._about(tick)), **parts)
@@ -78,7 +79,7 @@ class StoredStates:
 
     def _load(self, tick: int) -> bool:
         path = self._path(tick)
-        if not path.exists():  # another process has just tidied it up
+        if not os.path.exists(path):  # another process has just tidied it up
             return False
         try:
             with open_input(path, "state", BUDGET) as stream, Archive(stream) as archive:
@@ -99,7 +100,7 @@ class StoredStates:
     def _ticks(self) -> Iterator[int]:
         for path in self.folder.glob(f"{self._key}-*{SUFFIX}"):
             number = path.name.removeprefix(f"{self._key}-").removesuffix(SUFFIX)
-            if number.isdecimal() and not path.is_symlink():
+            if number.isdecimal() and not os.path.islink(path):
                 yield int(number)
 
     def _path(self, tick: int) -> Path:
