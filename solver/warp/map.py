@@ -260,7 +260,8 @@ class WarpMap:
         Raises:
             ValueError: if a number is not finite, too large, or outside these limits.
         """
-        numbers("a brush's centre", center, 2)
+        x, y = numbers("a brush's centre", center, 2)
+        center = x, y  # also of a list or an array
         numbers("a brush", (radius, hardness, amount), 3)
         if radius <= 0:
             raise ValueError(f"a brush of radius {radius:g} was given; it must be above 0")

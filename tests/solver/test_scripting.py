@@ -33,6 +33,7 @@ from solver import (
     WarpMap,
 )
 from solver.brush.push import Push
+from solver.brush.tip import Path as TipPath
 from solver.gl.context import ContextError
 from solver.gl.field import Field, FieldError
 from solver.resample.plan import Sampling
@@ -583,6 +584,26 @@ def test_a_function_may_work_in_place_and_give_the_same_arrays_again(device: Dev
         for item in (fluid, paper, warp):
             item.release()
     for other, wanted in zip(found[1], found[0], strict=True):
+        np.testing.assert_array_equal(other, wanted)
+
+
+@pytest.mark.parametrize("kind", [list, np.array])
+def test_a_place_may_be_a_tuple_or_a_list_or_an_array(device: Device, kind: Callable[[Any], Any]) -> None:
+    grid, found = Grid(20, 12), []
+    for made in (tuple, kind):
+        start, end = made((0.3, 0.2)), made((0.4, 0.25))
+        tip = Tip(start, end, 0.15, others=(TipPath(end, start, True),))
+        fluid, warp, masks, brush = Fluid(device, grid), WarpMap(device, grid), Masks(device, grid), Brush(device)
+        masks.thicken(tip, 1.0)
+        brush.push(fluid, tip, 0.1)
+        fluid.step(0.1)
+        warp.set(np.full((12, 20, 2), 0.02))
+        warp.restore_under(start, 0.1)
+        found.append((fluid.faces().get(), warp.read(), masks.thickness.get()))
+        for item in (fluid, warp, masks):
+            item.release()
+    for other, wanted in zip(*found, strict=True):
+        assert np.ptp(wanted) > 0
         np.testing.assert_array_equal(other, wanted)
 
 
