@@ -13,7 +13,7 @@ from PIL import Image, ImageCms
 
 from app.errors import UserError
 from app.media.encoders import ANIMATIONS
-from app.media.formats import FORMATS, TABLE, Format
+from app.media.formats import FORMATS, TABLE, Format, check_picture_output
 from app.media.holding import unheld
 from app.media.pictures import read_picture, write_picture
 from app.model.picture import Layer, Picture
@@ -38,6 +38,15 @@ WORDS = {
 }
 WRITTEN = [kind for kind in TABLE if kind.write]
 DTYPES = {8: np.uint8, 16: np.uint16, 32: np.float32}
+
+
+@pytest.mark.parametrize("kind", [kind for kind in WRITTEN if kind.longest < 2**31 - 1], ids=lambda kind: kind.name)
+def test_neither_side_of_a_picture_is_longer_than_its_format_holds(kind: Format) -> None:
+    path, most = f"a{kind.endings[0]}", kind.longest
+    check_picture_output(path, size=(most, most))
+    for size in (most + 1, 1), (1, most + 1):
+        with pytest.raises(UserError, match=f"{size[0]} x {size[1]} pixels, and {kind.name} holds no side longer than"):
+            check_picture_output(path, size=size)
 
 
 def full(bits: int) -> Picture:

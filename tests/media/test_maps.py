@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import re
 import resource
 import struct
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -46,6 +48,29 @@ def swirl(height: int, width: int, overscan: int = 0) -> Displacement:
 
 def identity(height: int, width: int) -> Displacement:
     return Displacement(np.zeros((height, width, 2), np.float32))
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the address space is asked of Linux")
+@pytest.mark.parametrize("ending", [".npy", ".flo"])
+def test_a_map_that_does_not_fit_into_the_memory_is_told_by_its_name(tmp_path: Path, ending: str):
+    """Of 4 GiB, none of which is on the disk, where one more is left."""
+    file, rows, columns = tmp_path / f"large{ending}", 2**14, 2**15
+    with file.open("wb") as stream:
+        if ending == ".npy":
+            about = {"descr": "<f4", "fortran_order": False, "shape": (rows, columns, 2)}
+            np.lib.format.write_array_header_1_0(stream, about)
+        else:
+            stream.write(struct.pack("<fii", 202021.25, columns, rows))
+        stream.truncate(stream.tell() + 8 * rows * columns)
+    limits = resource.getrlimit(resource.RLIMIT_AS)
+    in_use = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    told = f"Cannot read {file}: it does not fit into the memory; close other programs, or make it smaller first."
+    try:
+        resource.setrlimit(resource.RLIMIT_AS, (in_use + 2**30, limits[1]))
+        with pytest.raises(UserError, match=f"^{re.escape(told)}$"):
+            read_map(file, max_pixels=2**40)
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, limits)
 
 
 # What the files hold ------------------------------------------------------------------------------------------------

@@ -145,6 +145,19 @@ def test_levels_blur_and_stretch(pictures: Pictures) -> None:
     assert (wide.min(), wide.max()) == (0, 1)
 
 
+@pytest.mark.parametrize("cells", [100, 683, 1025, 2049])
+def test_the_cells_that_an_edge_between_levels_goes_through_have_their_part_of_both(
+    pictures: Pictures, cells: int
+) -> None:
+    """The finer cells of one that the edge halves; a grid that is finer than those has one at each place."""
+    layers = [layer(kind="picture", picture="half.png", scale=1, levels=2)]
+    steps = viscosity(layers, 0, Grid.for_picture(256, 192, cells), pictures)
+    assert (steps[:, : cells // 2] == 0).all()
+    assert (steps[:, -(cells // 2) :] == 1).all()
+    if cells == 683:  # twice as many
+        assert steps[:, 341] == pytest.approx(0.5)
+
+
 def test_layers_combine(pictures: Pictures) -> None:
     half = {"kind": "picture", "picture": "half.png"}
 

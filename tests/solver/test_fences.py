@@ -29,6 +29,22 @@ with Device.headless() as device:
 """
 
 
+HOLDING = """
+from solver.gl.device import Device
+from support.resources import resident
+with Device.headless() as device:
+    assert "llvmpipe" in device.limits.renderer
+    field = device.field((8, 8), 2)
+    for number in range(1000):
+        for _ in range(250):
+            device.fences.hold()
+        field.clear()
+        if number == 100:
+            before = resident()
+    print(resident() - before)
+"""
+
+
 @pytest.fixture(scope="module")
 def late_threads(tmp_path_factory: pytest.TempPathFactory) -> Path:
     library = tmp_path_factory.mktemp("late") / "late_threads.so"
@@ -57,3 +73,13 @@ def test_a_fence_outlives_its_signal(late_threads: Path, what: str):
         [sys.executable, "-c", DRAWING.format(what=what)], capture_output=True, text=True, env=environment
     )
     assert ran.returncode == 0, ran.stderr
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the memory of a process is asked of Linux")
+def test_of_many_fences_the_last_ones_alone_are_kept() -> None:
+    """225,000 of them, of some hundred bytes each."""
+    path = os.pathsep.join(map(str, (ROOT, ROOT / "tests")))
+    chosen = {"GALLIUM_DRIVER": "llvmpipe", "LIBGL_ALWAYS_SOFTWARE": "1", "LP_NUM_THREADS": "2", "PYTHONPATH": path}
+    ran = subprocess.run([sys.executable, "-c", HOLDING], capture_output=True, text=True, env=os.environ | chosen)
+    assert ran.returncode == 0, ran.stderr
+    assert int(ran.stdout) < 2**23

@@ -135,6 +135,25 @@ def test_what_is_outside_by_less_than_a_map_can_tell_is_the_edge(
         assert np.allclose(found[2:-2, 2:-2], 0.5, atol=1e-3)
 
 
+@pytest.mark.parametrize("size", [(64, 40), (40, 64)], ids=str)
+@pytest.mark.parametrize("way", [(0, 1), (0, -1), (1, 1), (1, -1)], ids=str)
+def test_of_a_fluid_s_map_half_a_texel_outside_is_the_edge(
+    device: Device, size: tuple[int, int], way: tuple[int, int]
+) -> None:
+    """On whichever side, and of a picture that is broad or high."""
+    (axis, sign), (width, height) = way, size
+    warp = WarpMap(device, Grid.for_picture(width, height, 16))
+    half = 0.5 * width / warp.size_for(size, size)[0]  # in pixels, as those of the other side
+    assert half == 0.5 * height / warp.size_for(size, size)[1]
+    displacement, picture = np.zeros((height, width, 2), np.float32), np.full((height, width, 4), 0.5, np.float32)
+    for beyond, is_there in ((0.9 * half, True), (1.1 * half, False)):
+        displacement[..., axis] = sign * (0.5 + beyond) / 64
+        warp.set(displacement)
+        found = Sampler(device).apply(warp, picture, how=Sampling(samples=1, premultiplied=True)).swapaxes(0, axis)
+        assert np.allclose(found[4:-4, -1 if sign > 0 else 0], 0.5, atol=1e-3) == is_there
+        assert np.allclose(found[4:-4, 4:-4], 0.5, atol=1e-3)
+
+
 @pytest.mark.parametrize("samples", ["auto", 1, 4])
 def test_black_outside_is_opaque_as_far_as_it_takes_part(device: Device, samples: int | str) -> None:
     """A picture of one alpha: "transparent" edges tell which part of a pixel it covers, "black" ones fill the rest."""

@@ -140,6 +140,24 @@ class Desk:
         rows = np.frombuffer(data, np.uint8, row * height, start + 12 * colours).reshape(height, row)
         return rows[:, : 4 * width].reshape(height, width, 4)[..., 2::-1]
 
+    @contextmanager
+    def covered(self, left: int, top: int, right: int, bottom: int) -> Iterator[None]:
+        """While the block runs, a magenta window without a frame lies over a part of the screen."""
+        from Xlib import X
+
+        size, root = (right - left, bottom - top), self._x.screen().root
+        cover = root.create_window(
+            left, top, *size, 0, X.CopyFromParent, override_redirect=True, background_pixel=0xFF00FF
+        )
+        cover.map()
+        self._x.sync()
+        try:
+            self.until(lambda: bool((self.seen()[top:bottom, left:right] == (255, 0, 255)).all()), "the cover")
+            yield
+        finally:
+            cover.destroy()
+            self._x.sync()
+
     def title(self) -> str:
         return self.titles().get(self.window, "")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 import time
 from collections.abc import Callable, Generator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 from threading import Semaphore
@@ -25,6 +25,7 @@ from app.model.picture import Picture
 from app.progress import Progress
 from app.ui.export_choices import ANIMATION, ANIMATIONS, PICTURE
 from app.ui.files import tick_for
+from app.ui.widgets import Ui
 from app.work.export import run
 from app.work.jobs import Outputs
 from app.work.journal import Origin, project_of
@@ -198,6 +199,30 @@ def test_after_two_others_it_comes_back_with_the_frame_at_the_playhead(viewer: R
         assert workspace.work.picture is None
 
 
+def test_the_pace_sound_and_time_code_of_what_is_exported_are_told(
+    viewer: Robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    dialog, words, wrapped = export_dialog(viewer, tmp_path), list[str](), Ui.wrapped
+    clip, dialog.choices.kind = dialog.clip, ANIMATION
+    assert clip is not None
+    viewer.editor.dialogs.show(dialog)
+    monkeypatch.setattr(Ui, "wrapped", lambda ui, said, *how: words.append(said) or wrapped(ui, said, *how))
+    sound, code = {"sounds": ("aac",)}, {"timecode": "01:00:00:00"}
+    about: list[tuple[dict[str, Any], str]] = [
+        ({}, "at its 25 frames a second."),
+        ({"fps": Fraction(30000, 1001)}, "at its 29.97 frames a second."),
+        ({"durations": (1, 3)}, "at its own pace."),
+        (sound, "at its 25 frames a second, with its sound."),
+        (code, "at its 25 frames a second, with its time code."),
+        (sound | code, "at its 25 frames a second, with its sound and time code."),
+    ]
+    for changes, told in about:
+        dialog.clip = replace(clip, **changes)
+        words.clear()
+        viewer.frame()
+        assert [said for said in words if said.startswith("The clip")] == [f"The clip warped, {told}"]
+
+
 def test_it_comes_back_with_its_project_and_is_missed_with_a_sentence(viewer: Robot, clip: Path, tmp_path: Path):
     """A project refers to its clip; unsaved work on it outlasts a crash."""
     editor = viewer.editor
@@ -348,12 +373,13 @@ def test_of_what_cannot_be_read_nothing_is_awaited_but_what_is_there() -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class Losing(Counted):
-    """Of it something is lost when it is read."""
+    """Of it two things are lost when it is read."""
 
     def pictures(
         self, part: FrameRange = WHOLE, *_: Any, notice: Callable[[str], None] = print, **others: Any
     ) -> Generator[tuple[int, Picture], None, None]:
         notice("its depth is lost")
+        notice("its alpha is lost")
         yield from super().pictures(part)
 
 
@@ -362,9 +388,10 @@ def test_what_is_lost_of_a_clip_that_is_looked_at_is_told() -> None:
     reel = Reel(clip, lambda picture: picture.pixels)
     reel.want(3, runs=False)
     deadline = time.monotonic() + 60
-    while not (words := reel.take_words()) and time.monotonic() < deadline:
+    while ((found := reel.best()) is None or found[0] != 3) and time.monotonic() < deadline:
         time.sleep(0.001)
-    assert set(words) == {"its depth is lost"}
+    assert reel.take_words() == ["its depth is lost", "its alpha is lost"], "all of it, in order"
+    assert reel.take_words() == []
     reel.close()
 
 

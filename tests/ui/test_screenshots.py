@@ -10,6 +10,7 @@ from PIL import Image
 
 from app.model.mask_edits import MaskStroke
 from app.ui import screenshots
+from app.ui.events import Move
 from solver.gl.device import Device
 
 
@@ -33,6 +34,22 @@ def test_the_picture_of_the_overlays_shows_them_while_a_stroke_goes_by(
         # A picture is of what is so now, and not of the frame before.
         offscreen.editor.preferences.theme = "light"
         assert np.abs(offscreen.picture().astype(int) - seen)[:20].mean() > 50
+    finally:
+        offscreen.close()
+
+
+def test_the_picture_of_before_and_after_shows_no_brush(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nor is anything else of the canvas another one once the pointer has left the window, which is light."""
+    monkeypatch.setattr(screenshots, "SIZE", (800, 500))
+    offscreen = screenshots.OffscreenEditor(device, grid=24)
+    try:
+        seen = screenshots.compare(offscreen)
+        state, rect = offscreen.editor.state, offscreen.editor.view.rect
+        assert (offscreen.editor.preferences.theme, state.split) == ("light", 0.425)
+        assert seen[:20].mean() > 150
+        offscreen.frame(Move(-1e4, -1e4))
+        canvas = slice(int(rect.y) + 1, int(rect.y + rect.height)), slice(int(rect.x) + 1, int(rect.x + rect.width))
+        np.testing.assert_array_equal(offscreen.picture()[canvas], seen[canvas])
     finally:
         offscreen.close()
 

@@ -38,6 +38,8 @@ def desk(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Desk]:
 
 # What asks nothing of a machine at rest that it does not ask of a busy one.
 busy = pytest.mark.parametrize("desk", [True], indirect=True, ids=["busy"])
+# And what asks nothing of a busy one that it does not ask of one at rest.
+idle = pytest.mark.parametrize("desk", [False], indirect=True, ids=["idle"])
 
 
 def still(desk: Desk) -> np.ndarray:
@@ -94,6 +96,16 @@ def test_a_dialog_is_whole_after_the_interface_has_changed_its_size(desk: Desk) 
     for _ in range(5):
         desk.key("shift")
     assert not differs(still(desk), seen, 300, 100, 980, 700)
+
+
+@idle
+def test_what_was_covered_is_drawn_again(desk: Desk) -> None:
+    """And not only with the next frame, for which nothing asks: the pointer rests elsewhere."""
+    desk.do("mousemove", "1140", "640")
+    before = still(desk)
+    with desk.covered(500, 300, 700, 450):
+        still(desk)
+    assert not differs(still(desk), before, 500, 300, 700, 450)
 
 
 @busy

@@ -472,6 +472,23 @@ def test_what_is_led_after_strokes_is_fitted_after_them(device: Device):
     assert found.errors.max() < 0.1
 
 
+@pytest.mark.parametrize(
+    "moving",
+    [
+        '[[stroke]]\ntool = "push"\nradius = 0.1\nsamples = [[0, 0.8, 0.7, 1.0], [7, 0.8, 0.72, 1.0]]\n',
+        "[[change]]\ntick = 3\ndrag = 1.0\n",
+        '[[force]]\nkind = "vortex"\npoint = [0.8, 0.7]\nradius = 0.1\nstrength = 0.1\n',
+        "",
+    ],
+    ids=["stroke", "change", "force", "nothing"],
+)
+def test_where_something_else_moves_the_fluid_its_viscosity_stays(device: Device, moving: str):
+    """To the last digit, also where there is none; of handles alone it is one of the things that are searched."""
+    inviscid = FREE.replace("viscosity = 0.03", "viscosity = 0.0")
+    found = fit(device, PAIRS[:1], 1, inviscid + moving).trial.recipe.fluid.viscosity
+    assert (found == 0) == bool(moving)
+
+
 def test_the_points_of_a_curve_arrive_and_are_told_by_its_name(device: Device):
     along = np.linspace(0, 1, 5)[:, None]
     line, wall = np.hstack([0.3 + 0 * along, 0.2 + 0.6 * along]), np.array([[[0.5, 0.5], [0.6, 0.5]]])

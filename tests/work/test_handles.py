@@ -675,6 +675,22 @@ def test_the_stiffer_of_two_handles_prevails(device: Device):
         thing.release()
 
 
+@pytest.mark.parametrize("stiffness", [0.1, 0.01])
+def test_alone_a_handle_of_little_stiffness_leads_by_about_that_part(device: Device, stiffness: float):
+    """Of how a handle of 1 sets the fluid going."""
+    speeds = []
+    for part in (1.0, stiffness):
+        grid = Grid(32, 32)
+        fluid, warp = Fluid(device, grid), WarpMap(device, grid)
+        fluid.set_viscosity(0.03)
+        handles = Handles(fluid, warp, [Handle((0.5, 0.5), (0.6, 0.5), RADIUS, duration=0.2, stiffness=part)])
+        handles.advance(1 / 60)
+        speeds.append(fluid.motion().largest_speed)
+        for thing in (handles, warp, fluid):
+            thing.release()
+    assert stiffness < speeds[1] / speeds[0] < 1.5 * stiffness
+
+
 def test_a_turn_goes_from_key_to_key(device: Device):
     turned = Handle((0.5, 0.5), rotate=20.0, duration=0.4, turned=((0.8, 50.0, 2.0), (1.2, -10.0, 1.0)))
     found = [turned.turn(time, DT) for time in (0.0, 0.4, 0.6, 0.8, 1.0, 9.0)]
