@@ -147,7 +147,8 @@ def test_what_gestures_make(tool: tools.Tool) -> None:
             )  # fmt: skip
             assert tool.gesture is not None
             first, *others = (
-                tools.Touch(touch.tick, *swap(touch.x, touch.y), touch.pressure, touch.shift) for touch in touches
+                touch if is_wide else tools.Touch(touch.tick, touch.y, touch.x, touch.pressure, touch.shift)
+                for touch in touches
             )
             gesture = tool.gesture(press, first)
             next(gesture)
