@@ -130,11 +130,6 @@ class Clip(ABC):
         """The number of the frame that is shown at a moment, if the clip is that long; see `moment`."""
         return self.start + moment
 
-    @property
-    def shortest(self) -> int:
-        """Of its frames, in steps of 1 / fps."""
-        return min(self.durations or [1])
-
     def lengths(self, part: FrameRange) -> list[int] | None:
         """The durations of the frames of a part, where they differ."""
         if self.durations is None:

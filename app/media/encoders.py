@@ -289,7 +289,7 @@ def check_animation(
     longest = LONGEST_SHOWN.get(suffix, inf)
     if fps * longest < 1 - 1e-9:
         most = f"{suffix} shows no frame for more than {longest:g} seconds"
-        raise UserError(f"Cannot write {path}: {most}; raise the rate or use .mp4.")
+        raise UserError(f"Cannot write {path}: {most}; use .mp4.")
     used = codec or next(iter(known))
     most = LARGEST.get(used)
     if size is not None and most is not None and (size[0] > most[0] or size[1] > most[1]):

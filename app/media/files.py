@@ -184,7 +184,7 @@ def _is_one(path: str | os.PathLike[str], other: str | os.PathLike[str]) -> bool
 
 def ignores_capitals(folder: Path) -> bool:
     """Whether names that differ in capitals alone are the same, on the disk of a folder that may have to be made."""
-    there = next(parent for parent in (folder.absolute(), *folder.absolute().parents) if parent.is_dir())
+    there = next(parent for parent in (folder.absolute(), *folder.absolute().parents) if os.path.isdir(parent))
     try:
         with tempfile.NamedTemporaryFile(dir=there, prefix=".fluidwarp-") as probe:
             return os.path.exists(there / Path(probe.name).name.upper())

@@ -26,7 +26,7 @@ ROOM = (100, 8 * LONGEST_GESTURE)
 
 
 def cut_off(recipe: Recipe, tick: int) -> Recipe:
-    """What of a recipe is done before a tick, and lasts until then; what is set at it, the fluid is seen with there."""
+    """What of a recipe is done before a tick, and lasts until then; what is set at it stays, as it is shown."""
     dt = recipe.fluid.dt
     handles = [before for handle in recipe.handle if (before := handle.before(tick, dt)) is not None]
     pins = [pin for pin in recipe.pin if pin.first_tick(dt) < tick]
@@ -48,7 +48,7 @@ def cut_off(recipe: Recipe, tick: int) -> Recipe:
 
 
 def ending_at(recipe: Recipe, tick: int) -> Recipe:
-    """A recipe that ends at a tick; at 0, before anything has acted, by one in which nothing does, or ends it."""
+    """A recipe that ends at a tick. It lasts a tick at least: at 0 all that acts in it, or stops it, is left out."""
     if tick == 0:
         recipe = cut_off(recipe, 0).edited(force=(), density=DensitySettings(), stop=Stop())
     return recipe.edited(duration=max(tick, 1) * recipe.fluid.dt)

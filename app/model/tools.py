@@ -364,7 +364,7 @@ TOOLS = (
         settings=("radius", "stiffness", "local"),
     ),
     Tool(
-        "thicken", "Thicken", "v", "Paint where the picture should resist Honey and Water",
+        "thicken", "Thicken", "v", "Paint where the picture should move less, with Honey and Water",
         painting("thicken", "thin"), ("Thicken", "Thin"), back="Paint where the picture should give way", masks=True,
     ),
     Tool(

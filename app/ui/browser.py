@@ -57,8 +57,9 @@ class Browser(Dialog):
             inside = [Path(entry.path) for entry in os.scandir(folder) if not entry.name.startswith(".")]
         except OSError as error:
             self._problem, inside = error.strerror or "it cannot be read", []
-        folders = [path for path in inside if path.is_dir()]
-        files = [path for path in inside if path.suffix.lower() in self.endings and path.is_file()]
+        # Not what Path has of them, which raises where the folder may not be searched.
+        folders = [path for path in inside if os.path.isdir(path)]
+        files = [path for path in inside if path.suffix.lower() in self.endings and os.path.isfile(path)]
         self.inside = sorted(folders, key=_by_name) + sorted(files, key=_by_name)
 
     def body(self, ui: Ui) -> bool:
@@ -90,7 +91,7 @@ class Browser(Dialog):
             if not self._go_to_typed():
                 return False
             done = self.writes and not self._is_typed and not self.problem
-        elif pressed and self._selected is not None and self._selected.is_dir():
+        elif pressed and self._selected is not None and os.path.isdir(self._selected):
             self.go(self._selected)
         else:
             done = done or pressed
@@ -123,14 +124,14 @@ class Browser(Dialog):
         flags = imgui.SelectableFlags_.allow_double_click
         picked, _ = imgui.selectable("##file", path == self._selected, flags, ImVec2(0, ui.px(26)))
         draw = imgui.get_window_draw_list()
-        icon = "folder" if path.is_dir() else "picture"
-        ink = packed(ui.palette.accent if path.is_dir() else ui.palette.dim)
+        icon = "folder" if os.path.isdir(path) else "picture"
+        ink = packed(ui.palette.accent if os.path.isdir(path) else ui.palette.dim)
         icons.draw(draw, icon, corner.x + ui.px(4), corner.y + ui.px(4), ui.px(18), ink)
         draw.add_text(ImVec2(corner.x + ui.px(30), corner.y + ui.px(5)), packed(ui.palette.text), printable(path.name))
         if picked:
             twice = imgui.is_mouse_double_clicked(0)
             self.typed = printable(str(self.folder))  # what is picked counts now
-            if path.is_dir():
+            if os.path.isdir(path):
                 self._selected = None if self.writes else path
                 return (path if twice else going), done
             self._selected = path

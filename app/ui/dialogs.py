@@ -250,7 +250,7 @@ class Unsaved(Dialog):
     Args:
         workspace: whose work it is.
         what: the person is about to do.
-        can_undo: Undo comes back to the work afterwards, as long as the window is open.
+        can_undo: Undo comes back to the work afterwards, as long as the window is open and has room for it.
         save: saves, and then does what it is given.
         then: does what the person is about to do.
     """
@@ -274,7 +274,7 @@ class Unsaved(Dialog):
         name = self._workspace.session.project.name
         said = f"is lost if you {self._what} without saving."
         if self._can_undo:
-            said = f"is not saved. If you {self._what}, Undo comes back to it until you quit."
+            said = f"is not saved. After you {self._what}, you can come back to it with Undo; it is lost when you quit."
         ui.wrapped(f"What you have done to “{name}” {said}", ui.palette.dim, 14)
         imgui.dummy(ImVec2(0, ui.px(8)))
         if ui.button("Don't save", width=108):

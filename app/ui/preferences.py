@@ -117,7 +117,7 @@ class Preferences:
         if self.path is None:
             return
         mine, before = self._values(), self._kept
-        theirs = Preferences._of(self.path)._values() if before and self.path.exists() else mine
+        theirs = Preferences._of(self.path)._values() if before and os.path.exists(self.path) else mine
         data = {name: _merged(before.get(name), mine[name], theirs[name]) for name in mine}
         if mine["recent"] != before.get("recent"):
             data["recent"] = list(dict.fromkeys([*mine["recent"][:1], *theirs["recent"], *mine["recent"]]))

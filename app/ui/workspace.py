@@ -139,6 +139,7 @@ class Workspace:
 
         `pixels`: the picture as the canvas shows it, if it is at hand. `found`: what the project was restored from.
         """
+        # Where no session can be begun, nothing holds the canvas any more, and its textures are given back.
         canvas, session = Canvas(self._device, project, pixels), Session(self._device, project)
         if found is not None:
             session.document.restore(found.work.history, found.work.saved)

@@ -127,7 +127,8 @@ class Outputs:
         if clip is not None:
             check_colours(self.file, self.codec, clip, self.is_animation, size)
         check_colours_of_picture(self.file, self.codec, picture, self.is_animation, size)
-        check_output(self.file, **kind, fps=rate / (clip.shortest if clip else 1), size=size)
+        for steps in set((clip and clip.lengths(self.part)) or [1]):
+            check_output(self.file, **kind, fps=rate / steps, size=size)
 
     def losses(self, **how: Any) -> Losses:
         """For what of the pictures `file` does not hold; `how` is as in `Written`."""

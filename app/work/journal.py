@@ -387,7 +387,7 @@ def project_of(origin: Origin, recipe: Recipe) -> Project:
             return Project(recipe, found.picture, data, folder, path, origin.embedded, clip=clip, seen=origin.seen)
         except (UserError, OSError):
             # A picture that was put into the project when it was saved is there still.
-            if path is None or not origin.embedded or not path.exists():
+            if path is None or not origin.embedded or not os.path.exists(path):
                 raise
     assert path is not None
     return replace(projects.load(path), recipe=recipe, seen=origin.seen)

@@ -307,7 +307,8 @@ class Recording:
 
     def _cut(self, tick: int) -> None:
         before, cut = self._base, cut_off(self._base, tick)
-        if any(getattr(cut, part) != getattr(before, part) for part in TIMED):
+        kept = all(getattr(cut, part) == getattr(before, part) for part in TIMED if part != "change")
+        if not kept or any(change.before(tick) != change for change in before.change):
             self.notice = f"Going on from {tick * self.dt:.1f} s. What came after it is one Undo away."
         self._base = self._live = cut
         self.replay.use(cut)

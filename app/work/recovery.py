@@ -324,7 +324,7 @@ class Found:
             return project_of(self.origin, self.work.recipe)
         except (UserError, OSError) as error:
             said = error.in_window if isinstance(error, UserError) else str(error)
-            why = said.removesuffix(".") if file.exists() else f"There is no {file} any more"
+            why = said.removesuffix(".") if os.path.exists(file) else f"There is no {file} any more"
             kept = f"The work on “{self.origin.name}” is kept; put the file back, and the next start offers it again."
             raise UserError(f"{why}. {kept}") from None
 

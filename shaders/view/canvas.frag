@@ -3,8 +3,8 @@
 // u_picture: premultiplied, sRGB; u_displacement (D): longer sides, linear filtering, over u_shown: left, top, width and
 // height, 0-1 of the picture; u_extent: width and height in longer sides. EDGES: see lib/beyond.glsl. SPLIT: left of u_split
 // the picture is as it was. CHECKER: something may be transparent; u_tile: side of a square of the checkerboard, pixels.
-// SEEN: u_seen, what picture.frag draws, is what is seen of it, its first pixel at u_corner. MOVED: u_moved is what is seen of
-// all of it.
+// SEEN: u_seen, what picture.frag draws, is what is seen of it, its first pixel at u_corner. MOVED, in
+// mode "density": u_moved, the whole picture as the fluid has carried its colours, is shown in place of it.
 // What is not asked for is left out by defines: a software rasteriser goes through both sides of every branch.
 // GRID: lines of the picture's own coordinates, u_grid of them along the longer side. MASKS: u_masks, what masks.frag draws,
 // its first pixel at u_corner too. ROOM: a tint where u_room, over the picture, swells or shrinks.

@@ -176,7 +176,7 @@ def of_clips(folder: Path) -> Iterator[tuple[str, Any]]:
         )
     ]  # fmt: skip
     for clip in clips:
-        yield "clip", [clip.moment(7), clip.shortest, clip.lengths((1, None)), clip.lengths((0, 1)), clip.digest(3)]
+        yield "clip", [clip.moment(7), clip.lengths((1, None)), clip.lengths((0, 1)), clip.digest(3)]
         yield "time codes", [clip.timecode_at(number) for number in (2, 3, 27, 100, 1799, 1802, 3600, 18000, 40000)]
     for ending in (*ANIMATIONS, *FORMATS, ".avi"):
         known = [codec for codec in getattr(ANIMATIONS.get(ending), "codecs", ()) if codec not in ("h265", "av1")]

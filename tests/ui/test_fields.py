@@ -244,7 +244,9 @@ def test_what_becomes_of_unsaved_work_is_told_as_it_is(
     robot.drop(tmp_path / "other.png")
     said = {line.partition(" | ")[2] for line in drawn.lines if "not saved" in line}
     assert len(said) == 1
-    assert said.pop().endswith(" is not saved. If you open other.png, Undo comes back to it until you quit.")
+    assert said.pop().endswith(
+        " is not saved. After you open other.png, you can come back to it with Undo; it is lost when you quit."
+    )
     widgets.click("Don't save")
     assert robot.editor.session.project.picture.width == 64
     robot.key("ctrl+z")

@@ -556,7 +556,7 @@ def test_a_hint_is_of_the_tool_in_hand(robot: Robot, monkeypatch: pytest.MonkeyP
         robot.frame()
         assert known & {*said} == {f"{hint}."}
     robot.mods, robot.editor.state.before = Mods(), True  # which has no legend
-    for is_opposite, hint in ((False, "should resist Honey and Water"), (True, "should give way")):
+    for is_opposite, hint in ((False, "should move less, with Honey and Water"), (True, "should give way")):
         robot.editor.state.choose_tool("thicken", is_opposite)
         robot.frame(count=2)
         said.clear()

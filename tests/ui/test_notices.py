@@ -21,6 +21,7 @@ from app.ui.messages import MOST, Messages
 from app.ui.preferences import MOST_RECENT, Preferences
 from app.ui.recovery_dialog import about
 from app.work.journal import Work
+from support.permissions import as_a_user, needs_permissions
 
 
 def test_the_newest_messages_stay_and_none_stands_twice() -> None:
@@ -133,6 +134,27 @@ def test_folders_are_listed_before_files(tmp_path: Path) -> None:
         (tmp_path / name).touch()
     browser = Browser("Open", tmp_path, (".png",), lambda path: None)
     assert [path.name for path in browser.inside] == ["b", "D", "A.png", "c.png"]
+
+
+@needs_permissions
+def test_of_a_folder_that_may_not_be_searched_a_browser_shows_nothing(tmp_path: Path) -> None:
+    """Nobody may say what in it is a folder."""
+    (tmp_path / "listed" / "inner").mkdir(parents=True)
+    (tmp_path / "listed" / "a.png").touch()
+    (tmp_path / "listed").chmod(0o444)
+    code = """
+from pathlib import Path
+from app.media.files import ignores_capitals
+from app.ui.browser import Browser
+browser = Browser("Open", Path.cwd(), (".png",), print)
+browser.go(Path("listed"))
+print(browser.inside, ignores_capitals(Path("listed/inner/deep")))
+"""
+    try:
+        told = as_a_user(code, tmp_path)
+    finally:
+        (tmp_path / "listed").chmod(0o755)
+    assert (told.stdout.split("\n")[0], told.returncode) == ("[] False", 0), told.stderr
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="names are texts elsewhere")

@@ -178,6 +178,19 @@ def test_the_frames_of_a_clip_that_stand_longer_come_less_often(tmp_path: Path, 
             one.check()
 
 
+@pytest.mark.parametrize(("part", "is_held"), [((0, None), False), ((1, 2), False), ((0, 1), True), ((3, None), True)])
+def test_a_frame_of_a_clip_that_stands_too_long_is_refused_before_the_work_if_it_is_asked_for(
+    tmp_path: Path, part: tuple[int, int | None], is_held: bool
+) -> None:
+    clip = replace(clip_of(tmp_path), fps=Fraction(1), durations=(1, 3, 656, 2))
+    one = replace(job(tmp_path, file="a.gif", part=part), clip=clip)
+    if is_held:
+        one.check()
+    else:
+        with pytest.raises(UserError, match=r"\.gif shows no frame for more than 655\.35 seconds; use \.mp4"):
+            one.check()
+
+
 @pytest.mark.parametrize("is_applied", [False, True], ids=["rendered", "applied"])
 @pytest.mark.parametrize(
     ("file", "outputs", "more", "said"),

@@ -1308,3 +1308,18 @@ def test_what_is_set_at_the_tick_where_one_goes_back_and_paints_stays(
     assert session.recipe.stroke[-1].first_tick == tick
     assert len(session.recipe.stroke) == 2
     assert session.recipe.fluid_at(tick) == shown
+
+
+def test_who_goes_on_at_the_very_start_with_what_is_set_there_has_cut_nothing_off(session: Session) -> None:
+    paint(session, "push", (0.3, 0.5), (0.4, 0.5), ticks=2)
+    session.stop_recording()
+    session.seek(0)
+    session.change("Fluid", drag=1.0)
+    assert session.notice is not None
+    session.stop_recording()
+    assert (session.recipe.stroke, session.recipe.fluid_at(0).drag) == ((), 1.0)
+    session.seek(0)
+    session.notice = None
+    paint(session, "push", (0.6, 0.5), (0.5, 0.5), ticks=2)
+    assert session.notice is None
+    assert (session.recipe.stroke[0].first_tick, session.recipe.fluid_at(0).drag) == (0, 1.0)
