@@ -1825,8 +1825,11 @@ def test_slow_painting_is_answered_by_a_coarser_grid_which_is_no_edit(measured: 
     assert not measured.editor.workspace.is_dirty
 
 
-def test_nothing_is_tried_ahead_while_another_grid_is_prepared(measured: Robot) -> None:
+def test_nothing_is_tried_ahead_while_another_grid_is_prepared(
+    measured: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Each would only take the time of the other."""
+    monkeypatch.setattr("app.ui.quality.AT_ONCE", 0.0)  # one tick a frame, however fast the machine is
     quality, rehearsal, frames = measured.editor.quality, measured.editor.rehearsal, 0
     measured.editor.session.begin_with(grid=128)
     paint_at(measured, 0.1, ENOUGH)
