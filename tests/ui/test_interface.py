@@ -171,8 +171,10 @@ def test_frames_are_drawn_for_a_pointer_that_rests_only_where_something_may_come
 def exporting(robot: Robot, folder: Path, patched: pytest.MonkeyPatch) -> Iterator[None]:
     patched.setattr("app.ui.export_dialog.ExportProcess", Still)
     robot.editor.exports.start(export_dialog(robot, folder).job())
-    yield
-    robot.editor.exports.cancel()
+    try:
+        yield
+    finally:
+        robot.editor.exports.cancel()
 
 
 @contextmanager
@@ -182,8 +184,10 @@ def a_fit(robot: Robot, folder: Path, patched: pytest.MonkeyPatch) -> Iterator[N
     robot.editor.session.edit("Handle", handle=(led,), duration=0.1)
     robot.editor.session.settle()
     robot.editor.fits.start()
-    yield
-    robot.editor.fits.give_up()
+    try:
+        yield
+    finally:
+        robot.editor.fits.give_up()
 
 
 @contextmanager
@@ -195,9 +199,11 @@ def a_file_that_is_opened(robot: Robot, folder: Path, patched: pytest.MonkeyPatc
         return project
 
     robot.editor.files.read(folder / "slow.png", load)
-    yield
-    robot.editor.files.give_up_loading()
-    done.set()
+    try:
+        yield
+    finally:
+        robot.editor.files.give_up_loading()
+        done.set()
 
 
 @contextmanager
@@ -208,23 +214,28 @@ def a_preview(robot: Robot, folder: Path, patched: pytest.MonkeyPatch) -> Iterat
     robot.editor.dialogs.show(dialog)
     Widgets(robot, patched).click("Preview")
     robot.move(2, 2)
-    yield
-    dialog.close()
-    robot.frame()
+    try:
+        yield
+    finally:
+        dialog.close()
+        robot.frame()
 
 
 @contextmanager
 def a_dialog_of_the_system(robot: Robot, folder: Path, patched: pytest.MonkeyPatch) -> Iterator[None]:
-    (folder / "zenity").write_text(f"#!/bin/sh\nwhile [ ! -e {folder}/done ]; do sleep 0.02; done\n")
+    waits = f"while [ -e {folder}/zenity ] && [ ! -e {folder}/done ]; do sleep 0.02; done"
+    (folder / "zenity").write_text(f"#!/bin/sh\n{waits}\n")
     (folder / "zenity").chmod(0o755)
     patched.setenv("PATH", f"{folder}:{os.environ['PATH']}")
     robot.editor.chooser.native = True
     robot.key("ctrl+o")
-    yield
-    (folder / "done").touch()
-    robot.until(lambda: not robot.editor.chooser.is_waiting)
-    robot.editor.dialogs.shown[-1].close()  # ours, as that one had no answer
-    robot.frame()
+    try:
+        yield
+    finally:
+        (folder / "done").touch()
+        robot.until(lambda: not robot.editor.chooser.is_waiting)
+        robot.editor.dialogs.shown[-1].close()  # ours, as that one had no answer
+        robot.frame()
 
 
 ELSEWHERE = (exporting, a_fit, a_file_that_is_opened, a_preview, a_dialog_of_the_system)
