@@ -27,9 +27,9 @@ class Called:
     """Whoever unpickles it calls a function first."""
 
     what: Callable[..., Any]
-    argument: float
+    argument: Any
 
-    def __reduce__(self) -> tuple[Callable[..., Any], tuple[float]]:
+    def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any]]:
         return self.what, (self.argument,)
 
 
@@ -46,13 +46,18 @@ class Dying(Job):
 
 @dataclass(frozen=True)
 class Slow(Job):
-    """A job whose process takes its time to read it."""
+    """A job whose process takes its time to read it, and makes a file before it reads the rest."""
 
-    slow: Any = None
+    slow: Path = Path()
     rest: bytes = b""
 
     def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
-        return Slow, (Called(time.sleep, PATIENCE), self.rest)
+        return Slow, (Called(make_late, self.slow), self.rest)
+
+
+def make_late(file: Path) -> None:
+    time.sleep(PATIENCE)
+    file.touch()
 
 
 def ended(process: ExportProcess, warn: Callable[[str], object] = lambda said: None) -> ExportProcess:
@@ -95,10 +100,10 @@ def test_what_is_told_before_the_work_is_heard_before_it_is_done_and_not_again(t
 
 def test_nobody_waits_for_one_that_is_stopped_also_while_its_process_is_getting_it(tmp_path: Path):
     """Nor does whoever starts it wait until it has got it. Whoever stops it hears when it has ended, which is soon."""
-    job = Slow(Recipe(), read_picture(PICTURE), tmp_path, Outputs(tmp_path / "out.png"), rest=bytes(10_000_000))
-    started = time.monotonic()
+    picture, outputs, late = read_picture(PICTURE), Outputs(tmp_path / "out.png"), tmp_path / "late"
+    job = Slow(Recipe(), picture, tmp_path, outputs, slow=late, rest=bytes(10_000_000))
     process, has_ended = ExportProcess(job), threading.Event()
-    assert time.monotonic() - started < PATIENCE / 2
+    assert not late.exists()
     started = time.monotonic()
     process.stop(has_ended.set)
     assert time.monotonic() - started < 1
