@@ -61,6 +61,13 @@ def small_project(folder: Path, grid: int = 48) -> Project:
     return from_picture(folder / "pattern.png", recipe.edited(fluid=recipe.fluid.model_copy(update={"grid": grid})))
 
 
+def folding() -> np.ndarray:
+    """A displacement of the pattern, in longer sides, that folds over itself at one place."""
+    y, x = np.mgrid[0:180, 0:240] / 240
+    bump = -1.5 * (x - 0.5) * np.exp(-((x - 0.5) ** 2 + (y - 0.4) ** 2) / 0.1**2)
+    return np.stack([bump, 0 * y], axis=-1).astype(np.float32)
+
+
 def add_bars(session: Session) -> None:
     """For three strokes: forces with a name and with a formula; a stroke is muted and one repeats."""
     whirl = VortexForce(kind="vortex", point=(0.5, 0.5), strength=0.1, name="Whirl", during=(0.5, 1.8))

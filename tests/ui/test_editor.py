@@ -58,7 +58,7 @@ from solver.resample.plan import Sampling
 from solver.resample.sampler import Sampler
 from support.commands import Run
 from support.drawn import Drawn
-from support.editing import BY_KEY, Robot, export_dialog, pattern, small_project, write_foreign_map
+from support.editing import BY_KEY, Robot, export_dialog, folding, pattern, small_project, write_foreign_map
 from support.gl_objects import living
 from support.widgets import Widgets
 
@@ -142,9 +142,7 @@ def test_a_fold_of_work_that_is_opened_is_told_each_time(
 ) -> None:
     """As that of a map to start from: it is there in the first frame."""
     monkeypatch.setattr("app.ui.canvas.PARTS", 1)
-    y, x = np.mgrid[0:180, 0:240] / 240
-    bump = -1.5 * (x - 0.5) * np.exp(-((x - 0.5) ** 2 + (y - 0.4) ** 2) / 0.1**2)
-    np.save(tmp_path / "m.npy", np.stack([bump, 0 * y], axis=-1).astype(np.float32) * 240)
+    np.save(tmp_path / "m.npy", folding() * 240)
     (tmp_path / "r.toml").write_text('picture = "pattern.png"\nmap = "m.npy"\n')
     for _ in range(times):
         robot.editor.messages.shown.clear()

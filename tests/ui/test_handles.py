@@ -31,7 +31,7 @@ from app.work.session import Session
 from solver.gl.device import Device
 from support.commands import Run
 from support.drawn import Drawn
-from support.editing import Robot, small_project
+from support.editing import Robot, folding, small_project
 from support.widgets import Widgets
 
 
@@ -664,9 +664,7 @@ def contradict(robot: Robot) -> None:
 
 
 def fold(robot: Robot) -> None:
-    y, x = np.mgrid[0:180, 0:240] / 240
-    bump = -1.5 * (x - 0.5) * np.exp(-((x - 0.5) ** 2 + (y - 0.4) ** 2) / 0.1**2)
-    robot.editor.session.replay.warp.set(np.stack([bump, 0 * y], axis=-1).astype(np.float32))
+    robot.editor.session.replay.warp.set(folding())
 
 
 @pytest.mark.parametrize(
