@@ -304,7 +304,7 @@ def test_a_driver_that_has_stopped_is_told_as_that_and_not_as_a_bug(device: Devi
 @pytest.fixture(scope="module")
 def second() -> Iterator[Device]:
     with Device.headless() as second:
-        for number in range(20):  # so that the next is called otherwise than the next of the other device
+        for number in range(20):  # so that the next has another OpenGL name than the next of the other device
             second.pass_("gl/copy.frag", NUMBER=number)
         yield second
 

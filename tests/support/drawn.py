@@ -17,15 +17,8 @@ SHAPES = (
     "add_circle", "add_circle_filled", "add_convex_poly_filled", "add_image", "add_line", "add_polyline", "add_rect",
     "add_rect_filled", "add_text", "add_triangle_filled", "push_clip_rect", "pop_clip_rect",
 )  # fmt: skip
-UNSEEN = (
-    "percent",
-    "edge",
-    "ruler",
-    "bars",
-    "entry",
-    "preset",
-    "track",
-)  # that can be pressed beside what is drawn there
+# Invisible buttons that are larger than, or beside, what is drawn.
+UNSEEN = ("percent", "edge", "ruler", "bars", "entry", "preset", "track")
 NEAR = 0.6  # points, and of the numbers for the canvas's shader, parts of a hundred
 
 
