@@ -29,12 +29,14 @@ ENDS = [path[1] for path in TIP.paths]
 COUNT = len(ENDS)
 
 
+def uploaded(device: Device, inputs: dict[str, Any]) -> dict[str, Any]:
+    """The arrays among them as fields."""
+    return {name: device.upload(value) if isinstance(value, np.ndarray) else value for name, value in inputs.items()}
+
+
 def drawn(device: Device, shader: str, components: int, size: tuple[int, int], **inputs: Any) -> np.ndarray:
     target = device.field(size, components)
-    given: dict[str, Any] = {
-        name: device.upload(value) if isinstance(value, np.ndarray) else value for name, value in inputs.items()
-    }
-    device.pass_(shader)(target, **given)
+    device.pass_(shader)(target, **uploaded(device, inputs))
     return target.get().astype(np.float64)
 
 
@@ -238,10 +240,7 @@ def share_of(number: int) -> float:
 
 def under(device: Device, shader: str, vectors: list[tuple[float, float]], **inputs: Any) -> np.ndarray:
     target = device.field(GRID.size, 2)
-    given: dict[str, Any] = {
-        name: device.upload(value) if isinstance(value, np.ndarray) else value for name, value in inputs.items()
-    }
-    CLOSE.draw(device.pass_(shader), target, GRID, vectors, blend="add", **given)
+    CLOSE.draw(device.pass_(shader), target, GRID, vectors, blend="add", **uploaded(device, inputs))
     return target.get().astype(np.float64)
 
 
@@ -330,7 +329,6 @@ def test_what_is_local_is_carried_less_where_it_is_thicker_or_beside_what_is_clo
     target = device.field(GRID.size, 2)
     given: dict[str, Any] = {"motion": motion, "slip": SLIP, "viscosity": VISCOSITY}
     given |= {"distance": distance} if solids else {}
-    uploaded: dict[str, Any] = {name: device.upload(value) for name, value in given.items()}
     pass_ = device.pass_("brush/carry.frag", **({"SOLIDS": 1} if solids else {}))
-    CLOSE.draw(pass_, target, GRID, VECTORS, blend="add", row=1.0, **uploaded)
+    CLOSE.draw(pass_, target, GRID, VECTORS, blend="add", row=1.0, **uploaded(device, given))
     np.testing.assert_allclose(target.get(), wanted, atol=2e-4)
